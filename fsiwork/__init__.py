@@ -1,0 +1,1 @@
+"""Level-set fluid-structure interaction that anybody can run, check and trust."""

@@ -1,0 +1,1 @@
+"""The physics of bodies: each answers four verbs (blend, push, hold, move); they know no scene."""

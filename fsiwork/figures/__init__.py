@@ -1,0 +1,1 @@
+"""Dataset in, figure out; the only place with matplotlib."""

@@ -1,0 +1,1 @@
+"""Datasets in, datasets and numbers out: convergence, stability, trade-off, exact solutions."""
