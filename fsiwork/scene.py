@@ -1,0 +1,219 @@
+"""A scene: frozen, checked data that says what is simulated. YAML in, faults in the field's words out.
+
+`Scene` is the YAML file and the YAML file is the `Scene`: unknown keys are refused, and every fault names
+its path (``fluid.density: must be positive, got -1``).
+"""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, ClassVar, Literal
+
+import yaml
+from pydantic import ValidationError
+
+from fsiwork.specs.base import Fault, Positive, Spec, got, sense, whole, wording
+from fsiwork.specs.bodies import Body, Energy, Law, Linear, Membrane, Quadratic, Transport, Width
+from fsiwork.specs.box import Box, Edges, FreeSlip, Inflow, NoSlip, Outflow, Periodic, Side, Wall
+from fsiwork.specs.fluid import Fluid, Inside, Rest, Shear, TaylorGreen
+from fsiwork.specs.shapes import (
+    Ball,
+    Block,
+    Capsule,
+    Cassini,
+    Ellipsoid,
+    Intersection,
+    Minus,
+    Moved,
+    Polygon,
+    Shape,
+    Slot,
+    Torus,
+    Union,
+)
+from fsiwork.specs.yaml import Loader
+
+__all__ = [
+    "Ball", "Block", "Body", "Box", "Capsule", "Cassini", "Clock", "Edges", "Ellipsoid", "Energy", "Fluid",
+    "FreeSlip", "Inflow", "Inside", "Intersection", "Law", "Linear", "Membrane", "Minus", "Moved", "NoSlip",
+    "Outflow", "Output", "Periodic", "Polygon", "Quadratic", "Rest", "Scene", "SceneError", "Shape", "Shear",
+    "Side", "Slot", "TaylorGreen", "Torus", "Transport", "Union", "Wall", "Width", "faults", "load", "loads",
+]  # fmt: skip
+
+
+class SceneError(ValueError):
+    """A scene that cannot be simulated; ``faults`` has one line for each thing that is wrong."""
+
+    def __init__(self, *faults: str):
+        super().__init__("\n".join(faults))
+        self.faults = list(faults)
+
+
+class Clock(Spec):
+    """From t = 0 to ``end``, with ``frames`` evenly spaced frames after the first.
+
+    ``step`` is Δt, or ``auto``: ``safety`` times the longest stable step, looked at anew each step.
+    """
+
+    end: Positive
+    step: Positive | Literal["auto"]
+    frames: whole(1, 1_000_000) = 1
+    safety: Positive = 0.5
+
+    @sense("end", "step")
+    def _one_step(self) -> Iterator[Fault]:
+        if self.step != "auto" and self.step > self.end:
+            yield ("step",), f"must not exceed the end {self.end}, got {self.step}"
+
+
+class Output(Spec):
+    """What is kept: fields of the frames (``u`` is the whole velocity), and gauges every so many steps."""
+
+    fields: tuple[Literal["u", "v", "w", "p", "phi", "rho", "mu", "vorticity", "Y"], ...] = ("u", "p", "phi")
+    dtype: Literal["float64", "float32"] = "float64"
+    gauges_every: whole(1) = 1
+
+
+class Scene(Spec):
+    """Everything that determines a run."""
+
+    box: Box
+    fluid: Fluid
+    bodies: tuple[Body, ...] = ()
+    clock: Clock
+    output: Output = Output()
+    piecewise: ClassVar = frozenset({"bodies"})
+
+    @property
+    def gravity(self) -> tuple[float, ...]:
+        """Gravity with one number a direction [length/time²]."""
+        return self.fluid.gravity or (0.0,) * self.box.dim
+
+    @sense("box", "fluid")
+    def _directions(self) -> Iterator[Fault]:
+        dim = self.box.dim
+        if self.fluid.gravity and len(self.fluid.gravity) != dim:
+            yield ("fluid", "gravity"), f"must have {dim} numbers, got {len(self.fluid.gravity)}"
+        kinds = {side.kind for pair in self.box.sides[:2] for side in pair}
+        if self.fluid.initial.kind == "taylor-green" and not kinds <= {"periodic", "free-slip"}:
+            yield ("fluid", "initial"), "vortices need periodic or free-slip sides along x and y"
+
+    @sense("box", "bodies")
+    def _bodies_in_box(self) -> Iterator[Fault]:
+        for i, body in enumerate(self.bodies):
+            if body is None:
+                continue
+            misfits = list(body.shape.misfits(self.box.dim))
+            for path, text in misfits or _outside(body.shape, self.box):
+                yield ("bodies", i, "shape", *path), text
+            eps = body.width.of(self.box.h)
+            if not eps >= self.box.h * (1 - 1e-9):
+                knob = "length" if body.width.cells is None else "cells"
+                text = f"ε = {eps:.6g} is below the grid step {self.box.h:.6g}"
+                yield ("bodies", i, "width", knob), text
+
+    @sense("box", "bodies", "output")
+    def _fields_exist(self) -> Iterator[Fault]:
+        carried = {body.transport.carry for body in self.bodies if body is not None}
+        for k, name in enumerate(self.output.fields):
+            if name == "w" and self.box.dim == 2:
+                yield ("output", "fields", k), "w: the box has two directions"
+            if name == "Y" and self.bodies and None not in self.bodies and "map" not in carried:
+                yield ("output", "fields", k), "Y: no body has transport.carry: map"
+
+
+def _outside(shape, box: Box) -> Iterator[Fault]:
+    for a, (low, high) in enumerate(shape.bounds(box.dim)):
+        first, last = box.origin[a], box.origin[a] + box.length[a]
+        if box.sides[a][0].kind == "periodic":
+            if not high - low <= box.length[a]:
+                yield (), f"is wider than the periodic box along {'xyz'[a]} ({high - low:.6g} > {box.length[a]:.6g})"
+        elif not (low >= first and high <= last):
+            yield (
+                (),
+                f"leaves the box along {'xyz'[a]}: [{low:.6g}, {high:.6g}] is not inside [{first:.6g}, {last:.6g}]",
+            )
+
+
+def faults(error: Exception) -> list[str]:
+    """What is wrong, one line for each fault: ``path: text``."""
+    if isinstance(error, SceneError):
+        return error.faults
+    if isinstance(error, ValidationError):
+        details = error.errors(include_url=False)
+        return [f"{'.'.join(map(_key, d['loc'])) or 'scene'}: {wording(d)}" for d in details]
+    if isinstance(error, RecursionError):
+        return ["scene: nested too deeply"]
+    if isinstance(error, OSError):
+        return [f"{error.filename or 'scene'}: {error.strerror or error}"]
+    return [" ".join(str(error).split()) or type(error).__name__]
+
+
+def _key(part: str | int) -> str:
+    return part if isinstance(part, str) and part.isprintable() and part else got(part) if part != 0 else "0"
+
+
+def load(path: str | Path, overrides: Mapping[str, Any] | None = None) -> Scene:
+    """The scene in a YAML or JSON file, with some values replaced.
+
+    ``overrides`` maps dotted paths to values: ``{"bodies.0.energy.stiffness": 3}``. Raises `SceneError`
+    with all faults.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise SceneError(f"{path}: not a text file") from None
+    except OSError as error:
+        raise SceneError(f"{path}: {error.strerror or error}") from None
+    return loads(text, overrides, str(path))
+
+
+def loads(text: str, overrides: Mapping[str, Any] | None = None, name: str = "scene") -> Scene:
+    """The scene in a YAML or JSON text; ``name`` stands before faults of the syntax. See `load`."""
+    data = parse(text, name)
+    if data is None:
+        raise SceneError(f"{name}: empty")
+    if not isinstance(data, dict):
+        raise SceneError(f"{name}: must be a mapping with box, fluid, bodies, clock; got {got(data)}")
+    lines = [line for path, value in (overrides or {}).items() if (line := _replace(data, path, value))]
+    try:
+        scene = Scene.model_validate(data)
+    except (ValidationError, RecursionError) as error:
+        raise SceneError(*lines, *faults(error)) from None
+    if lines:
+        raise SceneError(*lines)
+    return scene
+
+
+def parse(text: str, name: str = "value") -> Any:
+    """YAML as data: 1e-3 is a number, only true and false are truth values, no key twice."""
+    try:
+        return yaml.load(text, Loader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
+        raise SceneError(f"{name}: {where}{error.problem or error.context}") from None
+    except (yaml.YAMLError, ValueError) as error:
+        raise SceneError(f"{name}: {' '.join(str(error).split())}") from None
+    except RecursionError:
+        raise SceneError(f"{name}: nested too deeply") from None
+
+
+def _replace(data: dict, path: str, value: Any) -> str:
+    """Put a value at a dotted path; what is wrong with the path, or nothing."""
+    *parents, last = path.split(".")
+    if not all((*parents, last)):
+        return f"{got(path)}: not a path; write a.b.c=value"
+    place: Any = data
+    for depth, key in enumerate((*parents, last)):
+        here = ".".join(path.split(".")[: depth + 1])
+        if isinstance(place, list):
+            if not (key.isdecimal() and int(key) < len(place)):
+                return f"{here}: unknown path, the list has {len(place)} items"
+            key = int(key)
+        elif not isinstance(place, dict):
+            return f"{here}: unknown path, {'.'.join(path.split('.')[:depth])} is {got(place)}"
+        if depth == len(parents):
+            place[key] = value
+        else:
+            place = place[key] if isinstance(place, list) else place.setdefault(key, {})
+    return ""

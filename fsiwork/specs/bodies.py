@@ -1,0 +1,116 @@
+"""Bodies: elastic membranes and drops, with their energy laws and numerical choices."""
+
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal, Protocol, runtime_checkable
+
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, TypeAdapter, WrapValidator
+from pydantic_core import core_schema
+
+from fsiwork.specs.base import Fault, NotNegative, Positive, Spec, got, one_of, sense, wrong
+from fsiwork.specs.fluid import Inside
+from fsiwork.specs.shapes import Shape
+
+
+class Quadratic(Spec):
+    """E(s) = ½ λ (s − 1)² per rest area (3.13): a membrane. ``stiffness`` is λ."""
+
+    kind: Literal["quadratic"] = "quadratic"
+    stiffness: Positive
+
+
+class Linear(Spec):
+    """E(s) = λ s per rest area: a drop. ``stiffness`` is λ, the surface tension."""
+
+    kind: Literal["linear"] = "linear"
+    stiffness: Positive
+
+
+@runtime_checkable
+class Law(Protocol):
+    """Any energy E(s) per rest area, s the stretch, with two derivatives; arrays in, arrays out. Python only."""
+
+    def E(self, s: Any) -> Any:
+        """Energy."""
+
+    def dE(self, s: Any) -> Any:
+        """Its first derivative."""
+
+    def ddE(self, s: Any) -> Any:
+        """Its second derivative."""
+
+
+class _LawInPython:
+    """How pydantic sees a `Law`: kept as it is, written as a name that cannot be read back."""
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, _source, _handler: GetCoreSchemaHandler):
+        def name(law):
+            return {"kind": "python", "name": f"{type(law).__module__}.{type(law).__qualname__}"}
+
+        return core_schema.is_instance_schema(Law, serialization=core_schema.plain_serializer_function_ser_schema(name))
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, _schema, _handler: GetJsonSchemaHandler):
+        return {"not": {}}
+
+
+_written = TypeAdapter(one_of(Quadratic, Linear))
+
+
+def _law(value, _handler):
+    if isinstance(value, Law):
+        return value
+    if isinstance(value, dict) and value.get("kind") == "python":
+        raise wrong(f"the law {got(value.get('name'))} was written in Python and must be given there")
+    return _written.validate_python(value)
+
+
+Energy = Annotated[Quadratic | Linear | Annotated[Law, _LawInPython], WrapValidator(_law)]
+
+
+class Width(Spec):
+    """ε, the half-width of the smeared interface: in cells, or as a length that refinement keeps."""
+
+    cells: Positive | None = None
+    length: Positive | None = None
+
+    @sense("cells", "length")
+    def _one(self) -> Iterator[Fault]:
+        if (self.cells is None) == (self.length is None):
+            yield (), f"give either cells or length, got {'both' if self.cells else 'neither'}"
+
+    def of(self, h: float) -> float:
+        """ε [length] for cells of side ``h``."""
+        return self.length if self.cells is None else self.cells * h
+
+
+class Transport(Spec):
+    """How the interface is carried: φ itself (field) or the backward map Y with φ = φ₀(Y) (map)."""
+
+    scheme: Literal["weno5", "weno-z", "upwind5", "upwind1"] = "weno5"
+    tableau: Literal["ssp-rk3", "ssp-rk2", "euler"] = "ssp-rk3"
+    carry: Literal["field", "map"] = "field"
+    dtype: Literal["float64", "float32"] = "float64"
+
+
+class Membrane(Spec):
+    """An elastic interface that reacts to its change of area (Chapter 3); with a linear law, a drop.
+
+    ``stretch`` is |∇φ₀|, the first ratio of current to rest area; ``surface_mass`` is per rest area.
+    ``form`` and ``dirac`` are chosen by the law unless an expert overrides them.
+    """
+
+    kind: Literal["membrane"] = "membrane"
+    shape: Shape
+    stretch: Positive = 1.0
+    energy: Energy
+    width: Width
+    coupling: Literal["explicit", "semi-implicit", "stabilised", "iterated"] = "semi-implicit"
+    form: Literal["auto", "normal-tangential", "divergence", "split"] = "auto"
+    dirac: Literal["auto", "plain", "renormalised"] = "auto"
+    inside: Inside | None = None
+    surface_mass: NotNegative = 0.0
+    transport: Transport = Transport()
+
+
+Body = one_of(Membrane)

@@ -1,0 +1,169 @@
+"""The box: its size, its cells, what happens at its sides."""
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator, Field
+
+from fsiwork.specs.base import Fault, Positive, Spec, Vector, finite, one_of, sense, whole
+
+AXES = "xyz"
+
+
+class Periodic(Spec):
+    """What leaves on this side comes in on the other."""
+
+    kind: Literal["periodic"] = "periodic"
+
+
+class NoSlip(Spec):
+    """A wall at rest."""
+
+    kind: Literal["no-slip"] = "no-slip"
+
+
+class FreeSlip(Spec):
+    """No flow through, no shear stress; also a plane of symmetry."""
+
+    kind: Literal["free-slip"] = "free-slip"
+
+
+class Wall(Spec):
+    """A wall that moves in its own plane."""
+
+    kind: Literal["wall"] = "wall"
+    velocity: Vector
+
+
+class Inflow(Spec):
+    """Fluid comes in. ``velocity`` is the largest one: everywhere (uniform) or half-way between the sides."""
+
+    kind: Literal["inflow"] = "inflow"
+    velocity: Vector
+    profile: Literal["uniform", "parabolic"] = "uniform"
+
+
+class Outflow(Spec):
+    """Fluid leaves at pressure zero."""
+
+    kind: Literal["outflow"] = "outflow"
+
+
+Side = one_of(Periodic, NoSlip, FreeSlip, Wall, Inflow, Outflow, short=True)
+SideSpec = Periodic | NoSlip | FreeSlip | Wall | Inflow | Outflow
+
+
+def _both(value):
+    """One side given for both."""
+    return (value, value) if isinstance(value, str | Mapping | Spec) else value
+
+
+Pair = Annotated[tuple[Side, Side], BeforeValidator(_both, json_schema_input_type=tuple[Side, Side] | Side)]
+
+
+class Edges(Spec):
+    """The sides of the box, direction by direction: (low, high), or one word for both."""
+
+    x: Pair
+    y: Pair
+    z: Pair | None = None
+
+    @sense("x")
+    def _x(self) -> Iterator[Fault]:
+        yield from self._pair("x")
+
+    @sense("y")
+    def _y(self) -> Iterator[Fault]:
+        yield from self._pair("y")
+
+    @sense("z")
+    def _z(self) -> Iterator[Fault]:
+        if self.z is not None:
+            yield from self._pair("z")
+
+    def _pair(self, axis: str) -> Iterator[Fault]:
+        low, high = getattr(self, axis)
+        if (low.kind == "periodic") != (high.kind == "periodic"):
+            yield (axis,), f"both sides are periodic or none, got {low.kind} and {high.kind}"
+
+
+class Box(Spec):
+    """A box of square (cubic) cells.
+
+    ``cells`` counts along the longest direction: the one knob of resolution.
+    """
+
+    length: Annotated[tuple[Positive, ...], Field(min_length=2, max_length=3)]
+    cells: whole(4, 100_000)
+    origin: Vector = Field(default_factory=lambda data: (0.0,) * len(data["length"]))
+    edges: Literal["walls", "periodic", "free-slip"] | Edges = "walls"
+
+    @property
+    def dim(self) -> int:
+        """2 or 3."""
+        return len(self.length)
+
+    @property
+    def h(self) -> float:
+        """Side of a cell [length]."""
+        return max(self.length) / self.cells
+
+    @property
+    def n(self) -> tuple[int, ...]:
+        """Cells in each direction."""
+        return tuple(round(length / self.h) for length in self.length)
+
+    @property
+    def sides(self) -> tuple[tuple[SideSpec, SideSpec], ...]:
+        """(low, high) side of each direction."""
+        if isinstance(self.edges, Edges):
+            return tuple(getattr(self.edges, AXES[a]) for a in range(self.dim))
+        side = {"walls": NoSlip, "periodic": Periodic, "free-slip": FreeSlip}[self.edges]()
+        return ((side, side),) * self.dim
+
+    @sense("length", "cells")
+    def _square(self) -> Iterator[Fault]:
+        for a, length in enumerate(self.length):
+            count = length / self.h
+            if not finite(count) or abs(count - round(count)) > 1e-6 * count or round(count) < 4:
+                yield (
+                    ("length", a),
+                    f"cells are square (side {self.h:.6g}): must be a whole number of them, 4 or more, got {length}",
+                )
+
+    @sense("length", "origin")
+    def _origin(self) -> Iterator[Fault]:
+        if len(self.origin) != self.dim:
+            yield ("origin",), f"must have {self.dim} numbers, got {len(self.origin)}"
+
+    @sense("length", "edges")
+    def _sides(self) -> Iterator[Fault]:
+        if isinstance(self.edges, Edges) and (self.edges.z is not None) != (self.dim == 3):
+            yield ("edges", "z"), "is required" if self.dim == 3 else "the box has two directions, x and y"
+            return
+        for a, pair in enumerate(self.sides):
+            for end, side in enumerate(pair):
+                for text in _velocity_faults(side, a, end, self.dim):
+                    yield ("edges", AXES[a], end, "velocity"), text
+        yield from self._through_flow()
+
+    def _through_flow(self) -> Iterator[Fault]:
+        where = {(AXES[a], end): side.kind for a, pair in enumerate(self.sides) for end, side in enumerate(pair)}
+        kinds = set(where.values())
+        for (axis, end), kind in where.items():
+            if kind == "outflow" and "inflow" not in kinds:
+                yield ("edges", axis, end), "an outflow needs an inflow"
+            if kind == "inflow" and "outflow" not in kinds:
+                yield ("edges", axis, end), "an inflow needs an outflow"
+
+
+def _velocity_faults(side: SideSpec, a: int, end: int, dim: int) -> Iterator[str]:
+    """What is wrong with the velocity on the side ``end`` of direction ``a``."""
+    if not isinstance(side, Wall | Inflow):
+        return
+    if len(side.velocity) != dim:
+        yield f"must have {dim} numbers, got {len(side.velocity)}"
+    elif isinstance(side, Wall) and side.velocity[a] != 0:
+        yield f"a wall moves in its own plane: component {AXES[a]} must be 0, got {side.velocity[a]}"
+    elif isinstance(side, Inflow) and not side.velocity[a] * (-1 if end else 1) > 0:
+        yield f"an inflow points into the box: component {AXES[a]} has the wrong sign, got {side.velocity[a]}"
