@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 
 PACKAGE = Path(__file__).resolve().parent
 RUN = ("core", "bodies", "scene", "simulate", "dataset")  # what the numbers of a run depend on
-ALSO = {"dataset": ("dataset", "layout", "netcdf", "checkpoint", "contour")}  # layers of several modules
+ALSO = {"scene": ("scene", "specs"), "dataset": ("dataset", "layout", "netcdf", "checkpoint")}  # of several modules
 NUMERICS = ("numpy", "scipy", "numba")
 SHELLS = {"sh", "bash", "dash", "zsh", "ksh", "fish", "tcsh"}
 T = TypeVar("T")
