@@ -1,0 +1,211 @@
+"""How large a time step may be: the linear model of section 1.6, and the real step of any scene by bisection.
+
+Functions `(scene, point) -> dict` are called by studies, point by point; `measure_1_54` reads the studies' datasets.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from fsiwork.studies import linear
+from fsiwork.studies.exact import step_limit
+
+
+def _columns(point: dict[str, Any]):
+    """Columns of one case from the short names of a study's axes."""
+    names = (("viscosity", 0.0), ("tension", 1.0), ("width", 1.5))
+    return tuple(np.array([float(point.get(name, default))]) for name, default in names)
+
+
+def spectral_limit(_scene, point: dict[str, Any]) -> dict[str, Any]:
+    """One case of the scan: ``viscosity``, ``tension``, ``width`` (ε/Δx), ``cells`` (even)."""
+    case, cells = _columns(point), int(point.get("cells", 16))
+    ratio, prediction = float(linear.spectral_limits(case, cells)[0]), float(linear.predicted(case, cells)[0])
+    return {"limit": ratio * prediction, "predicted": prediction, "deviation": ratio - 1}
+
+
+def stepping_limit(_scene, point: dict[str, Any]) -> dict[str, Any]:
+    """The same by ``steps`` time steps: ``excess`` is the limit over (1.54), less one."""
+    case, cells = _columns(point), int(point.get("cells", 16))
+    ratio = float(linear.stepping_limits(case, cells, int(point.get("steps", 20000)))[0])
+    prediction = float(linear.predicted(case, cells)[0])
+    return {"limit": ratio * prediction, "predicted": prediction, "excess": ratio - 1}
+
+
+def spectral_radius(_scene, point: dict[str, Any]) -> dict[str, Any]:
+    """Largest spectral radius over the modes for a ``scheme`` at ``ratio`` times (1.54)."""
+    case, cells = _columns(point), int(point.get("cells", 16))
+    dt = float(point["ratio"]) * linear.predicted(case, cells)
+    radius = linear.radius(point["scheme"], *linear.numbers(case, dt, cells), dt)
+    return {"radius": float(radius.max())}
+
+
+def linear_scan(_scene=None, point: dict[str, Any] | None = None) -> dict[str, Any]:
+    """All 936 cases at once: μ 0 and 1e-8…1e3, λ 1e-3…1e8, ε/Δx 0.5…10, on ``cells``² points with ``steps`` steps.
+
+    Returns the cases (dim ``case``), their spectral ``deviation`` and stepping ``excess`` from (1.54), and the largest
+    radius of the implicit, semi-implicit and printed schemes at 1e-6 to 1e8 times (1.54).
+    """
+    point = point or {}
+    cells, steps = int(point.get("cells", 16)), int(point.get("steps", 20000))
+    case = tuple(np.array(linear.CASES).T)
+    names = ("viscosity", "tension", "width")
+    out = {name: (("case",), column) for name, column in zip(names, case, strict=True)}
+    out["deviation"] = (("case",), linear.spectral_limits(case, cells) - 1)
+    out["excess"] = (("case",), linear.stepping_limits(case, cells, steps) - 1)
+    for scheme, factors in (
+        ("implicit", 10.0 ** np.arange(-6, 9)),
+        ("semi-implicit", 10.0 ** np.arange(-6, 9)),
+        ("predictor-printed", (1.5,)),
+    ):
+        steps_of = [factor * linear.predicted(case, cells) for factor in factors]
+        radii = [linear.radius(scheme, *linear.numbers(case, dt, cells), dt[:, None]).max() for dt in steps_of]
+        out[scheme.replace("-", "_") + "_radius"] = float(max(radii))
+    return out
+
+
+class Largest(NamedTuple):
+    """Result of `limit`: the largest step seen stable, how it ended, and how many runs it took.
+
+    ``found`` is 1 for a limit, 0 when nothing up to ``largest`` was unstable (``step`` is then ``largest``) and -1 when
+    no step was stable (``step`` is NaN): an instability in space, not in time.
+    """
+
+    step: float
+    found: int
+    trials: int
+
+
+def limit(stable: Callable[[float], bool], start: float, largest: float = 0.24, tolerance: float = 0.01) -> Largest:
+    """Largest Δt for which ``stable(Δt)`` holds: search from ``start`` by factors, then bisect to ``tolerance``.
+
+    Upwards by 1.3 as far as ``largest``, downwards by 2 as far as ``start``/256.
+    """
+    tried = []
+
+    def test(dt: float) -> bool:
+        tried.append(dt)
+        return stable(dt)
+
+    low = high = min(start, largest)
+    if test(low):
+        while low == high:
+            if low >= largest:
+                return Largest(largest, 0, len(tried))
+            high = min(1.3 * low, largest)
+            low = high if test(high) else low
+    else:
+        while low == high:
+            if high < start / 256:
+                return Largest(math.nan, -1, len(tried))
+            low = high / 2
+            high = high if test(low) else low
+    while high > (1 + tolerance) * low:
+        trial = math.sqrt(low * high)
+        low, high = (trial, high) if test(trial) else (low, trial)
+    return Largest(low, 1, len(tried))
+
+
+def _energy(law, stretch: float) -> tuple[float, float]:
+    """E(s) and E'(s) of a scene's energy law."""
+    if law.kind == "linear":
+        return law.stiffness * stretch, law.stiffness
+    return 0.5 * law.stiffness * (stretch - 1) ** 2, law.stiffness * (stretch - 1)
+
+
+def _releasable(body, length: float, area: float) -> float:
+    """Elastic energy of a uniformly stretched loop above that of the circle of the same area (in the plane)."""
+    rest = length / body.stretch
+    circle = 2 * math.sqrt(math.pi * area) / rest
+    return (_energy(body.energy, body.stretch)[0] - _energy(body.energy, circle)[0]) * rest
+
+
+def stays_bounded(scene, dt: float, horizon: float) -> tuple[bool, int]:
+    """Whether the run with steps ``dt`` is stable until ``horizon``, and the steps it took.
+
+    Unstable (MEASURED-coupling 1): kinetic energy above 1.1 times the elastic energy that can be released, or the
+    interface longer than 1.01 times at first, or anything not finite, or a solver that gives up.
+    """
+    from fsiwork.simulate import build, step  # the solver, only when it is asked for
+
+    sim = build(scene)
+    first = sim.gauges()
+    released = _releasable(scene.bodies[0], float(first["length"]), float(first["volume"]))
+    steps = math.ceil(horizon / dt - 1e-9)
+    for n in range(1, steps + 1):
+        try:
+            step(sim.flow, sim.bodies, dt)
+            now = sim.gauges()
+        except (ArithmeticError, RuntimeError):
+            return False, n
+        kinetic, length = float(now["kinetic_energy"]), float(now["length"])
+        if not (kinetic <= 1.1 * released and length <= 1.01 * float(first["length"])):  # false for NaN
+            return False, n
+    return True, steps
+
+
+def largest_step(scene, point: dict[str, Any]) -> dict[str, Any]:
+    """Largest stable Δt of the real step of a scene with one membrane or drop, to 1 %, by bisection.
+
+    ``point`` may hold ``horizon`` (time that has to be survived, default 1) and ``largest`` (where the search ends).
+    Beside ``limit`` and ``found`` (see `Largest`) it returns (1.54) with λ and with the tension s E'(s) in its place.
+    Raises ValueError for a scene without exactly one body in the plane.
+    """
+    if scene.box.dim != 2 or len(scene.bodies) != 1:
+        raise ValueError("the largest step is searched for one membrane or drop in the plane")
+    body, h = scene.bodies[0], scene.box.h
+    tension = body.stretch * _energy(body.energy, body.stretch)[1]
+    fluid, eps = scene.fluid, body.width.of(h)
+    by_stiffness = float(step_limit(body.energy.stiffness, fluid.viscosity, eps, h, fluid.density))
+    by_tension = float(step_limit(tension, fluid.viscosity, eps, h, fluid.density)) if tension > 0 else math.inf
+    total = 0
+
+    def stable(dt: float) -> bool:
+        nonlocal total
+        good, steps = stays_bounded(scene, dt, float(point.get("horizon", 1.0)))
+        total += steps
+        return good
+
+    result = limit(stable, min(by_stiffness, by_tension), float(point.get("largest", 0.24)))
+    return {
+        "limit": result.step,
+        "found": result.found,
+        "trials": result.trials,
+        "predicted_lambda": by_stiffness,
+        "predicted_tension": by_tension if tension > 0 else math.nan,
+        "n_steps": total,
+        "n_cells": scene.box.cells,
+    }
+
+
+def measure_1_54(datasets: dict[str, xr.Dataset]) -> dict[str, float]:
+    """How sharp (1.54) is in the linear model, what the other schemes do, and where the real step ends."""
+    radius = datasets["stability_schemes"]["radius"]
+    drop = datasets["stability_drop"]
+    excess = datasets["stability_stepping"]["excess"]
+    ratio = (drop["limit"] / drop["predicted_lambda"]).where(drop["found"] == 1)
+    unstable_everywhere = drop["found"] == -1
+
+    def largest(scheme):
+        return float(radius.sel(scheme=scheme).max())
+
+    def explicit(near):
+        return radius.sel(scheme="explicit").sel(ratio=near, method="nearest")
+
+    return {
+        "spectral_deviation": float(abs(datasets["stability_spectral"]["deviation"]).max(skipna=False)),
+        "stepping_excess_max": float(excess.max(skipna=False)),
+        "stepping_excess_min": float(excess.min(skipna=False)),
+        "explicit_below": float(explicit(0.99).max()),
+        "explicit_above": float(explicit(1.01).min()),
+        "implicit_radius": largest("implicit"),
+        "semi_implicit_radius": largest("semi-implicit"),
+        "printed_radius": largest("predictor-printed"),
+        "corrected_radius": largest("predictor-corrected"),
+        "drop_ratio_min": 0.0 if bool(unstable_everywhere.any()) else float(ratio.min()),
+        "drop_ratio_max": float(ratio.max()),
+        "drop_no_limit": float((drop["found"] == 0).sum()),
+    }
