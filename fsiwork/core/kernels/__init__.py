@@ -12,6 +12,6 @@ FASTMATH = {"contract", "arcp", "nsz", "reassoc"}
 loop = njit(parallel=True, error_model="numpy", fastmath=FASTMATH, cache=True)
 """Decorator of a kernel over rows (`prange` over ``start``)."""
 
-point = njit(error_model="numpy", fastmath=FASTMATH, inline="always")
+point = njit(error_model="numpy", fastmath=FASTMATH)
 """Decorator of a formula at one point; keep it in the file of the kernels that call it
 (the disk cache does not notice an edit in another file)."""
