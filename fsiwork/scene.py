@@ -6,14 +6,15 @@ its path (``fluid.density: must be positive, got -1``).
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 import yaml
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError, WrapValidator
 
-from fsiwork.specs.base import Fault, Positive, Spec, got, sense, whole, wording
+from fsiwork.specs.base import Positive, Spec, sense, tried, whole
 from fsiwork.specs.bodies import Body, Energy, Law, Linear, Membrane, Quadratic, Transport, Width
 from fsiwork.specs.box import Box, Edges, FreeSlip, Inflow, NoSlip, Outflow, Periodic, Side, Wall
+from fsiwork.specs.faults import Fault, got, wording, wrong
 from fsiwork.specs.fluid import Fluid, Inside, Rest, Shear, TaylorGreen
 from fsiwork.specs.shapes import (
     Ball,
@@ -48,6 +49,19 @@ class SceneError(ValueError):
         self.faults = list(faults)
 
 
+def _step(value, handler):
+    if isinstance(value, str) and value == "auto":
+        return value
+    try:
+        float(value) if isinstance(value, str) else None
+    except ValueError:
+        raise wrong(f"must be a number or auto, got {got(value)}") from None
+    return _POSITIVE.validate_python(value)
+
+
+_POSITIVE = TypeAdapter(Positive)
+
+
 class Clock(Spec):
     """From t = 0 to ``end``, with ``frames`` evenly spaced frames after the first.
 
@@ -55,11 +69,11 @@ class Clock(Spec):
     """
 
     end: Positive
-    step: Positive | Literal["auto"]
+    step: Annotated[Positive | Literal["auto"], WrapValidator(_step)]
     frames: whole(1, 1_000_000) = 1
     safety: Positive = 0.5
 
-    @sense("end", "step")
+    @sense
     def _one_step(self) -> Iterator[Fault]:
         if self.step != "auto" and self.step > self.end:
             yield ("step",), f"must not exceed the end {self.end}, got {self.step}"
@@ -81,44 +95,51 @@ class Scene(Spec):
     bodies: tuple[Body, ...] = ()
     clock: Clock
     output: Output = Output()
-    piecewise: ClassVar = frozenset({"bodies"})
 
     @property
     def gravity(self) -> tuple[float, ...]:
         """Gravity with one number a direction [length/time²]."""
         return self.fluid.gravity or (0.0,) * self.box.dim
 
-    @sense("box", "fluid")
-    def _directions(self) -> Iterator[Fault]:
-        dim = self.box.dim
-        if self.fluid.gravity and len(self.fluid.gravity) != dim:
-            yield ("fluid", "gravity"), f"must have {dim} numbers, got {len(self.fluid.gravity)}"
-        kinds = {side.kind for pair in self.box.sides[:2] for side in pair}
-        if self.fluid.initial.kind == "taylor-green" and not kinds <= {"periodic", "free-slip"}:
-            yield ("fluid", "initial"), "vortices need periodic or free-slip sides along x and y"
+    @sense
+    def _gravity(self) -> Iterator[Fault]:
+        if self.fluid.gravity and len(self.fluid.gravity) != self.box.dim:
+            yield ("fluid", "gravity"), f"must have {self.box.dim} numbers, got {len(self.fluid.gravity)}"
 
-    @sense("box", "bodies")
+    @sense
+    def _vortices(self) -> Iterator[Fault]:
+        if self.fluid.initial.kind == "taylor-green":
+            kinds = {side.kind for pair in self.box.sides[:2] for side in pair}
+            if not kinds <= {"periodic", "free-slip"}:
+                yield ("fluid", "initial"), "vortices need periodic or free-slip sides along x and y"
+
+    @sense
     def _bodies_in_box(self) -> Iterator[Fault]:
         for i, body in enumerate(self.bodies):
-            if body is None:
-                continue
-            misfits = list(body.shape.misfits(self.box.dim))
-            for path, text in misfits or _outside(body.shape, self.box):
-                yield ("bodies", i, "shape", *path), text
-            eps = body.width.of(self.box.h)
-            if not eps >= self.box.h * (1 - 1e-9):
-                knob = "length" if body.width.cells is None else "cells"
-                text = f"ε = {eps:.6g} is below the grid step {self.box.h:.6g}"
-                yield ("bodies", i, "width", knob), text
+            yield from tried(self._shape_fits(i, body))
+            yield from tried(self._width_fits(i, body))
 
-    @sense("box", "bodies", "output")
+    def _shape_fits(self, i: int, body: Membrane) -> Iterator[Fault]:
+        misfits = list(body.shape.misfits(self.box.dim))
+        for path, text in misfits or _outside(body.shape, self.box):
+            yield ("bodies", i, "shape", *path), text
+
+    def _width_fits(self, i: int, body: Membrane) -> Iterator[Fault]:
+        h, width = self.box.h, body.width
+        if not width.of(h) >= h * (1 - 1e-9):
+            knob = "length" if width.cells is None else "cells"
+            yield ("bodies", i, "width", knob), f"ε = {width.of(h):.6g} is below the grid step {h:.6g}"
+
+    @sense
     def _fields_exist(self) -> Iterator[Fault]:
-        carried = {body.transport.carry for body in self.bodies if body is not None}
         for k, name in enumerate(self.output.fields):
             if name == "w" and self.box.dim == 2:
                 yield ("output", "fields", k), "w: the box has two directions"
-            if name == "Y" and self.bodies and None not in self.bodies and "map" not in carried:
-                yield ("output", "fields", k), "Y: no body has transport.carry: map"
+
+    @sense
+    def _map_is_carried(self) -> Iterator[Fault]:
+        if "Y" in self.output.fields and "map" not in [body.transport.carry for body in self.bodies]:
+            yield ("output", "fields", self.output.fields.index("Y")), "Y: no body has transport.carry: map"
 
 
 def _outside(shape, box: Box) -> Iterator[Fault]:

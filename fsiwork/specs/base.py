@@ -1,10 +1,9 @@
 """The common ground of all specs: frozen, unknown keys refused, and every fault at once, in one line each."""
 
-import difflib
 import math
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
-from typing import Annotated, Any, ClassVar, get_args
+from typing import Annotated, Any, ClassVar, get_args, get_origin
 
 from pydantic import (
     BaseModel,
@@ -18,20 +17,9 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-FAULT = "fault"  # the one type of our own errors; their text is ready to be read
+from fsiwork.specs.faults import FAULT, Fault, detail, got, line, wrong
+
 LARGEST = 1e30  # beyond this a number is a slip, and products of a few of them would overflow
-
-Fault = tuple[tuple[str | int, ...], str]  # path inside a spec, what is wrong there
-
-
-def got(value: object) -> str:
-    """A value as it can stand at the end of a one-line message."""
-    try:
-        text = repr(value)
-    except (ValueError, RecursionError):  # an integer of thousands of digits, a list within itself
-        text = f"a {type(value).__name__} that cannot be printed"
-    text = "".join(c if c.isprintable() else "?" for c in text)
-    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def _number(value: Any) -> Any:
@@ -54,24 +42,40 @@ def whole(low: int, high: int = 10**9):
     return Annotated[int, BeforeValidator(_number), Field(ge=low, le=high)]
 
 
-def sense(*needs: str):
-    """Mark a method as a check of physical sense, run when the fields ``needs`` are right by themselves.
+def sense(method: Callable[[Any], Iterator[Fault]]):
+    """Mark a method as a check of physical sense. It yields faults; their paths count from its own spec.
 
-    The method yields faults ``(path, text)``; paths count from its own spec.
+    On a spec that has faults already the method meets only the sound fields; the others are not there, and
+    a check that asks for one ends (`tried`): that fault is reported anyway.
     """
+    method.is_check = True
+    return method
 
-    def mark(method: Callable[[Any], Iterator[Fault]]):
-        method.needs = needs
-        return method
 
-    return mark
+def tried(faults: Iterator[Fault]) -> Iterator[Fault]:
+    """Faults up to the first look at a field that is itself faulty, and so not there."""
+    try:
+        yield from faults
+    except Unsound:
+        return
+
+
+class Unsound(AttributeError):
+    """A faulty field was asked for."""
+
+
+class Nothing:
+    """Stands for an item of a list of which nothing is sound."""
+
+    def __getattr__(self, name):
+        raise Unsound(name)
 
 
 class Spec(BaseModel):
     """A piece of a scene. All its faults are reported together, those between fields included."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, protected_namespaces=())
-    piecewise: ClassVar[frozenset[str]] = frozenset()  # list fields whose sound items are checked beside faulty ones
+    divisible: ClassVar[bool] = True  # whether the sound fields of a faulty one are of use to checks further up
 
     @model_validator(mode="wrap")
     @classmethod
@@ -80,39 +84,48 @@ class Spec(BaseModel):
             return handler(data)
         lines = []
         try:
-            spec, sound = handler(data), set(cls.model_fields)
+            spec = handler(data)
         except ValidationError as error:
-            lines = [_line(cls, detail) for detail in error.errors(include_url=False)]
-            lines = [line for line in lines if line]
-            spec, sound = cls._sound_part(data, error)
+            details = error.errors(include_url=False)
+            lines = [fault for found in details if (fault := line(cls, found))]
+            spec = cls._sound_part(data, {found["loc"][0] for found in details if found["loc"]})
         for check in _checks(cls):
-            if sound.issuperset(check.needs):
-                lines += [_detail(path, text) for path, text in check(spec)]
+            lines += [detail(path, text) for path, text in tried(check(spec))]
         if lines:
             raise ValidationError.from_exception_data(cls.__name__, lines)
         return spec
 
     @classmethod
-    def _sound_part(cls, data: Any, error: ValidationError):
-        """The fields that are right by themselves, as an unchecked spec, and their names."""
+    def _sound_part(cls, data: Any, faulty: set):
+        """An unchecked spec without the faulty fields; of those that are specs, their sound part."""
         if not isinstance(data, Mapping):
-            return None, set()
-        faulty = {detail["loc"][0] for detail in error.errors(include_url=False) if detail["loc"]}
-        values = {}
-        for name in set(cls.model_fields) & set(data):
-            if name not in faulty:
-                values[name] = _adapter(cls, name).validate_python(data[name])
-            elif name in cls.piecewise and isinstance(data[name], list | tuple):
-                values[name] = tuple(_item(cls, name, item) for item in data[name])
-        defaults = {name for name, field in cls.model_fields.items() if not field.is_required()} - faulty - set(values)
-        defaults = {name for name in defaults if cls.model_fields[name].default_factory is None}
-        return cls.model_construct(**values), set(values) | defaults
+            return Nothing()
+        values = {name: _sound(cls, name, data[name], name in faulty) for name in set(cls.model_fields) & set(data)}
+        part = cls.model_construct(**{name: value for name, value in values.items() if value is not ABSENT})
+        for name, field in cls.model_fields.items():
+            if values.get(name) is ABSENT or (name not in values and name in faulty):
+                part.__dict__.pop(name, None)
+            elif name not in values and field.default_factory:
+                try:
+                    part.__dict__[name] = field.default_factory(part.__dict__)
+                except KeyError:  # made from a field that is not there
+                    part.__dict__.pop(name, None)
+        return part
+
+    def __getattr__(self, name):
+        """Only asked for what is not there."""
+        if name in type(self).model_fields or isinstance(getattr(type(self), name, None), property):
+            raise Unsound(name)
+        return super().__getattr__(name)
+
+
+ABSENT = object()
 
 
 @cache
 def _checks(cls) -> tuple:
     found = (getattr(cls, name, None) for name in dir(cls) if not name.startswith("__"))
-    return tuple(method for method in found if hasattr(method, "needs"))
+    return tuple(method for method in found if hasattr(method, "is_check"))
 
 
 @cache
@@ -121,73 +134,77 @@ def _adapter(cls, name: str) -> TypeAdapter:
     return TypeAdapter(Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation)
 
 
-@cache
-def _items(cls, name: str) -> TypeAdapter:
-    return TypeAdapter(get_args(cls.model_fields[name].annotation)[0])
+def _sound(cls, name: str, value: Any, faulty: bool):
+    """The value of a field as far as it is sound, or ABSENT."""
+    if not faulty:
+        return _adapter(cls, name).validate_python(value)
+    field = cls.model_fields[name]
+    return _part(field.annotation, field.metadata, value)
 
 
-def _item(cls, name: str, value: Any):
+def _part(annotation, metadata, value):
+    """What is sound of a faulty value."""
+    if picks := [m.func for m in metadata if isinstance(m, WrapValidator) and isinstance(m.func, _Pick)]:
+        annotation = picks[0].choose(value)
+    if get_origin(annotation) is Annotated:
+        inner, *more = get_args(annotation)
+        return _part(inner, more, value)
+    if get_origin(annotation) is tuple and isinstance(value, list | tuple):
+        item, *rest = get_args(annotation)
+        return tuple(_item(item, each) for each in value) if rest == [...] else ABSENT
+    for cls in (annotation, *get_args(annotation)):
+        if isinstance(cls, type) and issubclass(cls, Spec) and cls.divisible and isinstance(value, Mapping):
+            faulty = _faulty(cls, value)
+            return ABSENT if None in faulty else cls._sound_part(value, faulty)
+    return ABSENT
+
+
+def _faulty(cls, value) -> set:
+    """Names of the faulty fields; None stands for a fault of the whole."""
     try:
-        return _items(cls, name).validate_python(value)
+        cls.model_validate(value)
+    except ValidationError as error:
+        return {found["loc"][0] if found["loc"] else None for found in error.errors(include_url=False)}
+    return set()
+
+
+def _item(annotation, value):
+    try:
+        return TypeAdapter(annotation).validate_python(value)
     except ValidationError:
-        return None
+        part = _part(annotation, (), value)
+        return Nothing() if part is ABSENT else part
 
 
-def _detail(path, text: str) -> dict:
-    return {"type": PydanticCustomError(FAULT, "{text}", {"text": text}), "loc": tuple(path), "input": None}
+class _Pick:
+    """Chooses among specs by their ``kind``."""
 
+    def __init__(self, classes: tuple[type[Spec], ...], short: bool):
+        self.classes, self.short = classes, short
 
-def _line(cls, detail: dict) -> dict | None:
-    """One of pydantic's errors in the field's words; None for those that only follow from another."""
-    if detail["type"] == "default_factory_not_called":
-        return None
-    text = wording(detail)
-    path = detail["loc"]
-    if detail["type"] == "extra_forbidden":
-        close = difflib.get_close_matches(str(path[-1]), cls.model_fields, n=1)
-        text = (
-            f"unknown key; did you mean {close[0]}?" if close else f"unknown key; known: {', '.join(cls.model_fields)}"
-        )
-    return _detail(path, text)
+    @property
+    def kinds(self) -> dict[str, type[Spec]]:
+        return {kind: cls for cls in self.classes for kind in get_args(cls.model_fields["kind"].annotation)}
 
+    def choose(self, value):
+        """The class that a mapping names, or None."""
+        kind = value.get("kind") if isinstance(value, Mapping) else None
+        return self.kinds.get(kind) if isinstance(kind, str) else None
 
-def wording(detail: dict) -> str:
-    """The text of one of pydantic's error details, in the field's words."""
-    kind, limits, value = detail["type"], detail.get("ctx", {}), detail.get("input")
-    if kind == FAULT:
-        return detail["msg"]
-    if kind in ("missing", "default_factory_not_called"):
-        return "is required"
-    limit = limits.get("gt", limits.get("ge", limits.get("le")))
-    words = {
-        "greater_than": "must be positive" if limit == 0 else f"must be above {limit}",
-        "greater_than_equal": "must not be negative" if limit == 0 else f"must be at least {limit}",
-        "less_than_equal": f"must be at most {limit}",
-        "finite_number": "must be finite",
-        "literal_error": f"must be one of {limits.get('expected', '').replace(chr(39), '')}",
-        "too_short": f"must have at least {limits.get('min_length')} items",
-        "too_long": f"must have at most {limits.get('max_length')} items",
-        "extra_forbidden": "unknown key",
-        "recursion_loop": "refers to itself",
-    }
-    if kind in words:
-        return f"{words[kind]}, got {got(value)}"
-    for start, expected in (
-        ("float", "a number"),
-        ("int", "a whole number"),
-        ("tuple", "a list"),
-        ("model", "a mapping"),
-        ("dict", "a mapping"),
-        ("string", "a text"),
-    ):
-        if kind.startswith(start):
-            return f"must be {expected}, got {got(value)}"
-    return "".join(c if c.isprintable() else " " for c in detail["msg"])
-
-
-def wrong(text: str, *path: str | int) -> ValidationError:
-    """An error with one fault at ``path``, to be raised inside a validator."""
-    return ValidationError.from_exception_data("scene", [_detail(path, text)])
+    def __call__(self, value, _handler):
+        if isinstance(value, self.classes):
+            return value
+        names = ", ".join(self.kinds)
+        if self.short and isinstance(value, str):
+            value = {"kind": value}
+        if not isinstance(value, Mapping):
+            raise wrong(f"must be a mapping with a kind ({names}), got {got(value)}")
+        if "kind" not in value:
+            raise wrong(f"is required; one of {names}", "kind")
+        chosen = self.choose(value)
+        if chosen is None:
+            raise wrong(f"must be one of {names}, got {got(value['kind'])}", *(() if self.short else ("kind",)))
+        return chosen.model_validate(dict(value))
 
 
 def one_of(*classes: type[Spec], short: bool = False):
@@ -197,26 +214,11 @@ def one_of(*classes: type[Spec], short: bool = False):
     faults do not contain the kind.
     """
 
-    def pick(value, _handler):
-        if isinstance(value, classes):
-            return value
-        kinds = {kind: cls for cls in classes for kind in get_args(cls.model_fields["kind"].annotation)}
-        if short and isinstance(value, str):
-            value = {"kind": value}
-        if not isinstance(value, Mapping):
-            raise wrong(f"must be a mapping with a kind ({', '.join(kinds)}), got {got(value)}")
-        if "kind" not in value:
-            raise wrong(f"is required; one of {', '.join(kinds)}", "kind")
-        kind = value["kind"]
-        if not isinstance(kind, str) or kind not in kinds:
-            raise wrong(f"must be one of {', '.join(kinds)}, got {got(kind)}", *(() if short else ("kind",)))
-        return kinds[kind].model_validate(dict(value))
-
     union = classes[0]
     for cls in classes[1:]:
         union = union | cls
     kind = (Field(discriminator="kind"),) if len(classes) > 1 else ()
-    return Annotated[(union, *kind, WrapValidator(pick))]
+    return Annotated[(union, *kind, WrapValidator(_Pick(classes, short)))]
 
 
 def finite(*values: float) -> bool:

@@ -6,7 +6,8 @@ from typing import Annotated, Any, Literal, Protocol, runtime_checkable
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, TypeAdapter, WrapValidator
 from pydantic_core import core_schema
 
-from fsiwork.specs.base import Fault, NotNegative, Positive, Spec, got, one_of, sense, wrong
+from fsiwork.specs.base import NotNegative, Positive, Spec, one_of, sense
+from fsiwork.specs.faults import Fault, got, wrong
 from fsiwork.specs.fluid import Inside
 from fsiwork.specs.shapes import Shape
 
@@ -74,7 +75,7 @@ class Width(Spec):
     cells: Positive | None = None
     length: Positive | None = None
 
-    @sense("cells", "length")
+    @sense
     def _one(self) -> Iterator[Fault]:
         if (self.cells is None) == (self.length is None):
             yield (), f"give either cells or length, got {'both' if self.cells else 'neither'}"

@@ -3,9 +3,10 @@
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, WrapValidator
 
-from fsiwork.specs.base import Fault, Positive, Spec, Vector, finite, one_of, sense, whole
+from fsiwork.specs.base import Positive, Spec, Vector, finite, one_of, sense, whole
+from fsiwork.specs.faults import Fault, got, wrong
 
 AXES = "xyz"
 
@@ -68,15 +69,15 @@ class Edges(Spec):
     y: Pair
     z: Pair | None = None
 
-    @sense("x")
+    @sense
     def _x(self) -> Iterator[Fault]:
         yield from self._pair("x")
 
-    @sense("y")
+    @sense
     def _y(self) -> Iterator[Fault]:
         yield from self._pair("y")
 
-    @sense("z")
+    @sense
     def _z(self) -> Iterator[Fault]:
         if self.z is not None:
             yield from self._pair("z")
@@ -85,6 +86,31 @@ class Edges(Spec):
         low, high = getattr(self, axis)
         if (low.kind == "periodic") != (high.kind == "periodic"):
             yield (axis,), f"both sides are periodic or none, got {low.kind} and {high.kind}"
+        dim = 2 if self.z is None else 3
+        for end, side in enumerate((low, high)):
+            for text in _velocity_faults(side, AXES.index(axis), end, dim):
+                yield (axis, end, "velocity"), text
+
+    @sense
+    def _through_flow(self) -> Iterator[Fault]:
+        pairs = {"x": self.x, "y": self.y, "z": self.z or ()}
+        where = {(axis, end): side.kind for axis, pair in pairs.items() for end, side in enumerate(pair)}
+        for place, kind in where.items():
+            for one, other in (("outflow", "inflow"), ("inflow", "outflow")):
+                if kind == one and other not in where.values():
+                    yield place, f"an {one} needs an {other}"
+
+
+def _edges(value, handler):
+    """One word for all sides, or direction by direction; so that faults have plain paths."""
+    if isinstance(value, Mapping):
+        return Edges.model_validate(dict(value))
+    if isinstance(value, Edges) or (isinstance(value, str) and value in EVERYWHERE):
+        return handler(value)
+    raise wrong(f"must be one of {', '.join(EVERYWHERE)}, or a mapping of x, y (z); got {got(value)}")
+
+
+EVERYWHERE = {"walls": NoSlip(), "periodic": Periodic(), "free-slip": FreeSlip()}
 
 
 class Box(Spec):
@@ -96,7 +122,7 @@ class Box(Spec):
     length: Annotated[tuple[Positive, ...], Field(min_length=2, max_length=3)]
     cells: whole(4, 100_000)
     origin: Vector = Field(default_factory=lambda data: (0.0,) * len(data["length"]))
-    edges: Literal["walls", "periodic", "free-slip"] | Edges = "walls"
+    edges: Annotated[Literal["walls", "periodic", "free-slip"] | Edges, WrapValidator(_edges)] = "walls"
 
     @property
     def dim(self) -> int:
@@ -118,10 +144,9 @@ class Box(Spec):
         """(low, high) side of each direction."""
         if isinstance(self.edges, Edges):
             return tuple(getattr(self.edges, AXES[a]) for a in range(self.dim))
-        side = {"walls": NoSlip, "periodic": Periodic, "free-slip": FreeSlip}[self.edges]()
-        return ((side, side),) * self.dim
+        return ((EVERYWHERE[self.edges],) * 2,) * self.dim
 
-    @sense("length", "cells")
+    @sense
     def _square(self) -> Iterator[Fault]:
         for a, length in enumerate(self.length):
             count = length / self.h
@@ -131,30 +156,15 @@ class Box(Spec):
                     f"cells are square (side {self.h:.6g}): must be a whole number of them, 4 or more, got {length}",
                 )
 
-    @sense("length", "origin")
+    @sense
     def _origin(self) -> Iterator[Fault]:
         if len(self.origin) != self.dim:
             yield ("origin",), f"must have {self.dim} numbers, got {len(self.origin)}"
 
-    @sense("length", "edges")
+    @sense
     def _sides(self) -> Iterator[Fault]:
         if isinstance(self.edges, Edges) and (self.edges.z is not None) != (self.dim == 3):
             yield ("edges", "z"), "is required" if self.dim == 3 else "the box has two directions, x and y"
-            return
-        for a, pair in enumerate(self.sides):
-            for end, side in enumerate(pair):
-                for text in _velocity_faults(side, a, end, self.dim):
-                    yield ("edges", AXES[a], end, "velocity"), text
-        yield from self._through_flow()
-
-    def _through_flow(self) -> Iterator[Fault]:
-        where = {(AXES[a], end): side.kind for a, pair in enumerate(self.sides) for end, side in enumerate(pair)}
-        kinds = set(where.values())
-        for (axis, end), kind in where.items():
-            if kind == "outflow" and "inflow" not in kinds:
-                yield ("edges", axis, end), "an outflow needs an inflow"
-            if kind == "inflow" and "outflow" not in kinds:
-                yield ("edges", axis, end), "an inflow needs an outflow"
 
 
 def _velocity_faults(side: SideSpec, a: int, end: int, dim: int) -> Iterator[str]:

@@ -10,7 +10,8 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from fsiwork.specs.base import Fault, Number, Positive, Spec, Vector, one_of, sense
+from fsiwork.specs.base import Number, Positive, Spec, Vector, one_of, sense
+from fsiwork.specs.faults import Fault
 
 
 def _dot(a: Sequence[float], b: Sequence[float]) -> float:
@@ -18,6 +19,7 @@ def _dot(a: Sequence[float], b: Sequence[float]) -> float:
 
 
 class _Shape(Spec):
+    divisible: ClassVar[bool] = False
     vectors: ClassVar[tuple[str, ...]] = ("centre",)  # fields with one number a direction
     dims: ClassVar[tuple[int, ...]] = (2, 3)
 
@@ -114,7 +116,7 @@ class Torus(_Shape):
     tube: Positive
     dims: ClassVar = (3,)
 
-    @sense("radius", "tube")
+    @sense
     def _open(self) -> Iterator[Fault]:
         if not self.tube < self.radius:
             yield ("tube",), f"must be below the radius {self.radius}, got {self.tube}"
@@ -132,7 +134,7 @@ class Cassini(_Shape):
     a: Positive
     b: Positive
 
-    @sense("a", "b")
+    @sense
     def _one_piece(self) -> Iterator[Fault]:
         if not self.b > self.a:
             yield ("b",), f"must be above a = {self.a} (one oval), got {self.b}"
@@ -154,7 +156,7 @@ class Slot(_Shape):
     width: Positive
     depth: Positive
 
-    @sense("radius", "width", "depth")
+    @sense
     def _fits(self) -> Iterator[Fault]:
         for name in ("width", "depth"):
             if not getattr(self, name) < 2 * self.radius:
@@ -223,7 +225,7 @@ class Moved(_Shape):
     angle: Number = 0.0
     axis: Vector = (0.0, 0.0, 1.0)
 
-    @sense("axis")
+    @sense
     def _axis(self) -> Iterator[Fault]:
         if len(self.axis) != 3:
             yield ("axis",), f"must have 3 numbers, got {len(self.axis)}"
