@@ -88,7 +88,6 @@ def test_every_scene_is_right_and_comes_back_from_its_json(path):
         ("box.cells", 63.5, "box.cells: must be a whole number, got 63.5"),
         ("box.cells", 2, "box.cells: must be at least 4, got 2"),
         ("box.cells", 10**400, "box.cells: is too large, got 1000"),
-        ("box.cells", 10**5000, "box.cells: is too large, got something that cannot be printed (int)"),
         ("box.length", [2.0, 1.99], "box.length.1: cells are square (side 0.03125): must be a whole number"),
         ("box.length", [2.0], "box.length: must have at least 2 items, got [2.0]"),
         ("box.origin", [0.0, 0.0, 0.0], "box.origin: must have 2 numbers, got 3"),
@@ -158,6 +157,11 @@ def test_every_scene_is_right_and_comes_back_from_its_json(path):
 def test_a_fault_has_one_line_with_its_path(path, value, expected):
     found = lines(put(path, value))
     assert any(line.startswith(expected) for line in found), found
+
+
+def test_a_number_too_long_to_print_is_one_line():
+    found = lines(put("box.cells", 10**5000))
+    assert found == ["box.cells: is too large, got something that cannot be printed (int)"]
 
 
 def test_all_faults_come_at_once_those_between_fields_included():
