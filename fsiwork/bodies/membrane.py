@@ -1,0 +1,300 @@
+"""An elastic membrane (or a drop) immersed in the fluid: it reacts to its change of area (Chapter 3)."""
+
+import copy
+from collections.abc import Callable
+
+import numpy as np
+
+from fsiwork.bodies.band import Band
+from fsiwork.bodies.body import Body
+from fsiwork.bodies.extent import half_extent
+from fsiwork.bodies.laws import LINEAR, AtPoints, Law
+from fsiwork.bodies.pull import Pull
+from fsiwork.core.edges import Edges
+from fsiwork.core.grid import GHOSTS, Grid
+from fsiwork.core.kernels import interface as kernels
+from fsiwork.core.poisson import Direct
+from fsiwork.core.transport import Transport
+
+COUPLINGS = ("explicit", "semi-implicit", "stabilised", "iterated")
+STABILISER = {"stabilised": 0.35, "iterated": 0.5}  # c ≥ 1/4 in theory; measured stable (MEASURED-coupling 1)
+IN_TIME = 4.0  # a step this often (1.54) costs about three percent of the oscillation where it is stable
+XYZ = "xyz"
+
+
+class Membrane(Body):
+    """Interface φ = 0, φ < 0 inside, whose stretch is |∇φ|; energy ∫E(|∇φ|) D_ε (SPEC 5).
+
+    Parameters
+    ----------
+    grid, edges : where
+    phi0 : distance(x, y[, z]) to the interface [length], or a flat field φ (already multiplied by the stretch)
+    law : E(r), see `bodies.laws`
+    eps : half-width ε of D_ε [length]
+    transport : what carries φ or Y
+    stretch : |∇φ₀|, first ratio of current to rest area; counts for a distance only
+    form, dirac : see `bodies.pull`; ``auto``: normal-tangential and plain for surface tension, else divergence and
+        renormalised
+    coupling : ``explicit`` (3.59), ``semi-implicit`` (3.62)-(3.64), ``stabilised``, ``iterated``
+    carry : ``field`` (φ) or ``map`` (the backward map Y, and φ = stretch · distance(Y)); a map needs a distance
+    inside : density and viscosity inside, if they differ from the fluid's
+    surface_mass : mass per rest area
+
+    Attributes
+    ----------
+    phi : flat field at centres; Y : flat fields of the backward map, empty unless carried
+    guess : φ of the last pass of an iteration; while it is set, the force is taken there
+
+    Raises
+    ------
+    ValueError : an unknown word, or a map without a distance
+    """
+
+    def __init__(
+        self,
+        grid: Grid,
+        edges: Edges,
+        phi0: np.ndarray | Callable,
+        law: Law,
+        eps: float,
+        *,
+        transport: Transport,
+        stretch: float = 1.0,
+        form: str = "auto",
+        dirac: str = "auto",
+        coupling: str = "explicit",
+        carry: str = "field",
+        inside: tuple[float, float] | None = None,
+        surface_mass: float = 0.0,
+    ):
+        self._check(phi0, dirac, coupling, carry)
+        self.grid, self.edges, self.transport, self.eps = grid, edges, transport, float(eps)
+        self.coupling, self.inside, self.surface_mass = coupling, inside, float(surface_mass)
+        self._law = AtPoints(law, grid)
+        drop = self._law.kind == LINEAR
+        form = ("normal-tangential" if drop else "divergence") if form == "auto" else form
+        dirac = ("plain" if form == "normal-tangential" else "renormalised") if dirac == "auto" else dirac
+        self._pull = Pull(grid, self._law, form, self.eps, dirac == "renormalised")
+        self.form, self.dirac, self.guess = form, dirac, None
+        self._distance, self._stretch = phi0, float(stretch)
+        self.phi = grid.field(transport.dtype)
+        self.Y = [grid.sample(lambda *x, a=a: x[a], dtype=transport.dtype) for a in grid.axes if carry == "map"]
+        self._carriers = [self._carrier(a) for a in grid.axes if carry == "map"]
+        if not callable(phi0):
+            self.phi[:] = phi0
+        else:
+            self._from_map(grid.points())
+        edges.fill_scalar(self.phi, "linear")
+        self._plan()
+
+    # --- verbs ------------------------------------------------------------------------------------------------
+    def blend(self, flow, dt: float) -> None:
+        """Mix ρ = ρ₁ + (ρ - ρ₁) H_ε + m D_ε (3.19) and μ likewise; with renormalised D_ε, H_ε(φ/|∇φ|), so that ε is
+        the same length in both."""
+        if self.inside is None and not self.surface_mass:
+            return
+        rho, mu = self.inside or (flow.density, flow.viscosity)
+        self._mix(flow.mixture("rho"), rho, self.surface_mass)
+        if mu != flow.viscosity:
+            self._mix(flow.mixture("mu"), mu, 0.0)
+
+    def push(self, flow, dt: float) -> None:
+        """Add F[φⁿ], F[φ̃] (3.63) or F[guess] to ``flow.force``; the stabilised couplings raise ``flow.stiffness``."""
+        if self.coupling in STABILISER:
+            peak = self.survey()[kernels.PEAK]
+            flow.stiffness += STABILISER[self.coupling] * max(peak, 0.0) / self._least_density(flow)
+        if self.guess is None and self.coupling != "semi-implicit":
+            self._pull.add(flow.force, self.phi, self._band_now())
+            return
+        phi = self.predict(flow, dt) if self.guess is None else self.guess
+        if self._other is None:
+            self._other = Band(self.grid, self.eps, self.dirac == "renormalised")
+        self._other.find(phi)
+        self._pull.add(flow.force, phi, self._other)
+
+    def move(self, flow, dt: float) -> None:
+        """Carry φ, or Y and then φ = φ₀(Y), with ``flow.u`` (3.64)."""
+        for carrier, Y in zip(self._carriers, self.Y, strict=True):
+            carrier.advance([Y], flow.u, dt, "linear")
+        if self.Y:
+            self._from_map([self.grid.padded(Y) for Y in self.Y])
+            self.edges.fill_scalar(self.phi, "linear")
+        else:
+            self.transport.advance([self.phi], flow.u, dt, "linear")
+        self._fresh = False
+
+    # --- answers ----------------------------------------------------------------------------------------------
+    def explicit_limits(self, flow) -> dict[str, float]:
+        """(1.54) with T = max r E'(r) in place of λ, and with the tangential modulus M(E'r, E''r²), which still
+        limits a membrane that is hardly stretched; unit of both: time."""
+        values = self.survey()
+        names = {"elastic (1.54)": kernels.TENSION, "elastic, tangential": kernels.MODULUS}
+        return {name: self._limit(flow, float(values[column])) for name, column in names.items()}
+
+    def longest_step(self, flow) -> dict[str, float]:
+        """Limits of the explicit coupling; for the others no sharp one is known, so what a few percent allow."""
+        limits = self.explicit_limits(flow)
+        if self.coupling == "explicit":
+            return limits
+        return {"elastic, accuracy": IN_TIME * min(limits.values())}
+
+    def state(self) -> dict[str, np.ndarray]:
+        """φ, and Y if it is carried."""
+        return {"phi": self.phi.copy()} | {f"map_{XYZ[a]}": Y.copy() for a, Y in enumerate(self.Y)}
+
+    def restore(self, state: dict[str, np.ndarray]) -> None:
+        """Take back a `state`."""
+        self.phi[:] = state["phi"]
+        for a, Y in enumerate(self.Y):
+            Y[:] = state[f"map_{XYZ[a]}"]
+        self._fresh = False
+
+    def fields(self) -> dict[str, tuple[tuple[int, ...] | None, np.ndarray]]:
+        """φ and the components of Y at centres, views without ghosts."""
+        named = {"phi": self.phi} | {f"map_{XYZ[a]}": Y for a, Y in enumerate(self.Y)}
+        return {name: (None, self.grid.inside(q)) for name, q in named.items()}
+
+    def gauges(self, flow) -> dict[str, float]:
+        """Volume ∫1 - H_ε(φ) (kept by the flow), length (2D) or area (3D), elastic energy, centroid, half-extents
+        along the lines through it, extremes of the stretch where D_ε > 0."""
+        values, g = self.survey(), self.grid
+        volume, centre = self._volume()
+        out = {"volume": volume, "length" if g.dim == 2 else "area": float(values[kernels.LENGTH])}
+        out |= {"elastic_energy": float(values[kernels.ENERGY])}
+        for a in g.axes:
+            out[f"centroid_{XYZ[a]}"] = centre[a]
+            out[f"axis_{XYZ[a]}"] = half_extent(g, self.edges, self.phi, centre, a) if volume > 0.0 else 0.0
+        return out | {"stretch_min": float(values[kernels.LEAST]), "stretch_max": float(values[kernels.MOST])}
+
+    def survey(self) -> np.ndarray:
+        """Integrals and extremes over the band of φ, columns named in `core.kernels.interface`; kept until φ moves."""
+        band, law = self._band_now(), self._law
+        if self._values is None:
+            runs = band.inside
+            law.centres(self.phi, runs, band.cells_inside, self._s, every=True)
+            if self._table.shape[0] < runs.shape[0]:
+                self._table = np.zeros((2 * runs.shape[0], 8))
+            table = self._table[: runs.shape[0]]
+            kernels.survey(table, self.phi, runs, self._s, law.kind, self._pull.numbers, law.given)
+            self._values = np.array([0.0, 0.0, np.nan, np.nan, 0.0, 0.0, 0.0, 0.0])
+            if runs.shape[0] and table[:, kernels.MOST].max() > 0.0:
+                self._values[:2] = table[:, :2].sum(axis=0) * self.grid.cell_volume
+                self._values[2], self._values[3:] = table[:, 2].min(), table[:, 3:].max(axis=0)
+        return self._values
+
+    def predict(self, flow, dt: float) -> np.ndarray:
+        """φ̃ of (3.62), flat: (φ̃ - φ)/Δt - c(Δt/ε)Δφ̃ = -u·∇φ, c = max(E', 0)/ρ over the band, ∂_nφ̃ = 0 on walls."""
+        g = self.grid
+        if self._solver is None:
+            ends = [("periodic",) * 2 if self.edges.periodic(a) else ("neumann",) * 2 for a in g.axes]
+            self._solver, self._right, self._tilde = Direct(g.n, g.h, tuple(ends)), np.zeros(g.n), g.field()
+        start, n = g.rows()
+        for a, s in enumerate(g.strides):
+            kernels.carry_along(self._right.ravel(), self.phi, flow.u[a], start, n, s, 0.25 * dt / g.h, a == 0)
+        c = max(float(self.survey()[kernels.PULL]), 0.0) / self._least_density(flow)
+        g.inside(self._tilde)[...] = self._solver.solve(self._right, 1.0, c * dt**2 / self.eps)
+        self.edges.fill_scalar(self._tilde, "mirror")
+        return self._tilde
+
+    # --- parts ------------------------------------------------------------------------------------------------
+    def _check(self, phi0, dirac, coupling, carry):
+        for name, value, known in (
+            ("dirac", dirac, ("auto", "plain", "renormalised")),
+            ("coupling", coupling, COUPLINGS),
+            ("carry", carry, ("field", "map")),
+        ):
+            if value not in known:
+                raise ValueError(f"{name} must be one of {', '.join(known)}, got {value!r}")
+        if carry == "map" and not callable(phi0):
+            raise ValueError("a map needs a distance (function of coordinates), not a field")
+
+    def _plan(self):
+        g = self.grid
+        self._band = Band(g, self.eps, self.dirac == "renormalised")
+        self._other = self._solver = None
+        self._fresh, self._values, self._table = False, None, np.zeros((0, 8))
+        self._s = np.array([*g.strides, 0][:3])
+        self._sums = np.zeros((g.rows()[0].size, 3))
+        # Centroid: the mean, or in a periodic direction the angle of the mean of exp(2πi x/L).
+        angles = [2.0 * np.pi * (g.coordinate(a) - g.origin[a]) / g.length[a] for a in g.axes]
+        self._weights = [
+            np.array([np.cos(angles[a]), np.sin(angles[a])])
+            if self.edges.periodic(a)
+            else np.array([g.coordinate(a), np.zeros(g.n[a])])
+            for a in g.axes
+        ]
+
+    def _carrier(self, a: int) -> Transport:
+        """A transport that shares its scratch; along its own periodic direction Y grows by the period."""
+        if not self.edges.periodic(a):
+            return self.transport
+        carrier = copy.copy(self.transport)
+        carrier.edges = MapEdges(self.edges, a)
+        return carrier
+
+    def _from_map(self, Y):
+        """φ = stretch · distance(Y), Y taken back into a periodic box."""
+        g = self.grid
+        Y = [
+            np.mod(q - g.origin[a], g.length[a]) + g.origin[a] if self.edges.periodic(a) else q for a, q in enumerate(Y)
+        ]
+        g.padded(self.phi)[...] = self._stretch * self._distance(*Y)
+
+    def _band_now(self) -> Band:
+        if not self._fresh:
+            self._band.find(self.phi)
+            self._fresh, self._values = True, None
+        return self._band
+
+    def _mix(self, q, inside, mass):
+        band, (start, n) = self._band_now(), self.grid.rows()
+        numbers = self._pull.numbers
+        kernels.mix(q, self.phi, start, n, band.flags, band.row, self._s, numbers, float(inside), mass)
+        self.edges.fill_scalar(q, "mirror")
+
+    def _least_density(self, flow) -> float:
+        return min(flow.density, self.inside[0]) if self.inside else flow.density
+
+    def _limit(self, flow, T: float) -> float:
+        """(1.54): με + √(μ²ε² + ½ λ ε Δx² ρ), over λ."""
+        if not T > 0.0:
+            return np.inf
+        mu = min(flow.viscosity, self.inside[1]) if self.inside else flow.viscosity
+        damping = mu * self.eps
+        root = np.sqrt(damping**2 + 0.5 * T * self._least_density(flow) * self.eps * self.grid.h**2)
+        return float((damping + root) / T)
+
+    def _volume(self) -> tuple[float, tuple[float, ...]]:
+        """∫χ and ∫xχ/∫χ, χ = 1 - H_ε(φ)."""
+        g, band, (start, n) = self.grid, self._band_now(), self.grid.rows()
+        kernels.inside_sums(self._sums, self.phi, start, n, band.flags, band.row, self._weights[-1], self.eps)
+        total = float(self._sums[:, 0].sum())
+        if total == 0.0:
+            return 0.0, (np.nan,) * g.dim
+        rows, moments = self._sums[:, 0].reshape(g.n[:-1]), []
+        for a in g.axes[:-1]:
+            line = rows.sum(axis=tuple(b for b in range(rows.ndim) if b != a))
+            moments.append(self._weights[a] @ line)
+        moments.append(self._sums[:, 1:].sum(axis=0))
+        return total * g.cell_volume, tuple(self._mean(a, m, total) for a, m in enumerate(moments))
+
+    def _mean(self, a, moment, total) -> float:
+        g = self.grid
+        if not self.edges.periodic(a):
+            return float(moment[0] / total)
+        return float(g.origin[a] + np.arctan2(moment[1], moment[0]) % (2.0 * np.pi) * g.length[a] / (2.0 * np.pi))
+
+
+class MapEdges:
+    """Ghosts of component ``a`` of the backward map in a box that is periodic along ``a``: Y(x + L) = Y(x) + L."""
+
+    def __init__(self, edges: Edges, a: int):
+        self.edges, self.a = edges, a
+
+    def fill_scalar(self, Y: np.ndarray, rule: str) -> None:
+        """As `Edges.fill_scalar`, with the period added."""
+        self.edges.fill_scalar(Y, rule)
+        g = self.edges.grid
+        lines = np.moveaxis(g.padded(Y), self.a, 0)
+        lines[:GHOSTS] -= g.length[self.a]
+        lines[-GHOSTS:] += g.length[self.a]
