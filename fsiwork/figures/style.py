@@ -43,6 +43,7 @@ matplotlib.rcParams.update(
         "axes.titlelocation": "left",
         "axes.titlesize": 9.5,
         "figure.constrained_layout.use": True,
+        "figure.constrained_layout.w_pad": 0.1,
         "figure.dpi": DPI,
         "font.family": "DejaVu Sans",
         "font.size": 9,
@@ -69,7 +70,7 @@ def sheet(rows: int = 1, columns: int = 1, size: tuple[float, float] | None = No
 
 def shades(count: int) -> list[tuple[float, ...]]:
     """Colours for an ordered parameter (cells, time), dark to light, all of them dark enough for a line."""
-    return [tuple(SEQUENTIAL(q)) for q in np.linspace(0.05, 0.8, max(count, 2))[:count]]
+    return [tuple(SEQUENTIAL(q)) for q in np.linspace(0.05, 0.72, max(count, 2))[:count]]
 
 
 def band(ax, expected: float, tolerance: float = 0.0, label: str | None = None, axis: str = "y") -> None:
