@@ -14,9 +14,9 @@ from fsiwork.core.kernels import levelset as kernels
 
 
 def heaviside(phi: np.ndarray, eps: float, out: np.ndarray | None = None) -> np.ndarray:
-    """H_ε(φ) = ℋ(φ/ε), 0 inside and 1 outside (2.25), of half-width ε/|∇φ|, ghosts included.
+    """H_ε(φ) = ℋ(φ/ε), 0 inside and 1 outside, of half-width ε/|∇φ|, ghosts included.
 
-    ``eps`` in units of φ; its primitive counterpart is `dirac` with ``cosine`` and ``plain``: ℋ' = ζ.
+    ``eps`` in units of φ. ℋ(r) = (1 + r + sin(πr)/π)/2, so that ℋ' = ζ of `dirac` (cosine, plain).
     """
     out = np.empty_like(phi) if out is None else out
     kernels.heaviside(out, phi, phi.dtype.type(eps))
@@ -31,7 +31,7 @@ def dirac(
     grid: Grid | None = None,
     out: np.ndarray | None = None,
 ) -> np.ndarray:
-    """D_ε = ζ(φ/w)/w, the factor of δ_Γ ≈ D_ε |∇φ|.
+    """D_ε = ζ(φ/w)/w, the factor of δ_Γ ≈ D_ε |∇φ| (1.24).
 
     ``plain``: w = ε, of half-width ε/|∇φ| in space, all ghosts included. ``renormalised``: w = ε|∇φ|, of
     half-width ε [length] whatever the slope. ``one-norm``: w = ε|∇φ|₁, with the hat the choice that keeps the
@@ -84,7 +84,7 @@ def normal(grid: Grid, phi: np.ndarray, out: list[np.ndarray] | None = None) -> 
 
 
 def curvature(grid: Grid, phi: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
-    """H = div n at centres [1/length] from first and second differences; 0 where φ is flat, clipped nowhere."""
+    """H = div n at centres [1/length] from first and second differences (1.9); 0 where φ is flat, clipped nowhere."""
     out = np.zeros_like(phi) if out is None else out
     number = phi.dtype.type
     floor = number(np.finfo(phi.dtype).tiny ** 0.6)

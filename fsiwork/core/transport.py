@@ -1,4 +1,4 @@
-"""Transport of centre fields by a velocity on the faces: ∂t q + u·∇q = 0 (the book's 1.30)."""
+"""Transport of centre fields by a velocity on the faces: ∂t q + u·∇q = 0 (1.2)."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -36,7 +36,7 @@ class Transport:
     ----------
     grid : the grid
     edges : fills ghosts with ``fill_scalar(q, rule)``
-    scheme : ``weno5`` (Jiang and Shu's weights, 1.33), ``weno-z`` (fifth order at critical points too),
+    scheme : ``weno5`` (Jiang and Shu's weights), ``weno-z`` (fifth order at critical points too),
         ``upwind5`` (their linear limit: for smooth fields such as x - Y) or ``upwind1``
     tableau : ``ssp-rk3``, ``ssp-rk2`` or ``euler`` (the last sharpens kinks with WENO: for figures only)
     dtype : of the fields; float32 is safe at any magnitude of the field because the weights are relative

@@ -26,7 +26,7 @@ def difference(scheme, m3, m2, m1, o, p1, p2, r2, e):
     """h ∂q at ``o`` from three points upstream (m) and two downstream (p).
 
     Weighted mean of three parabolas with the ideal weights (1, 6, 3)/10 for `UPWIND5`, those of Jiang and
-    Shu for `WENO5` (1.33 of the book), of Borges et al. for `WENO_Z`; put over one denominator: one division.
+    Shu for `WENO5`, of Borges et al. for `WENO_Z`; put over one denominator: one division.
     """
     v2 = m1 - m2
     v3 = o - m1
