@@ -4,6 +4,7 @@ import json
 import tempfile
 import time
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,11 @@ import xarray as xr
 
 from fsiwork import layout, provenance
 from fsiwork.checkpoint import Store, need_space
+from fsiwork.joining import axis_names, join, tabulate
 from fsiwork.layout import VARIABLES
-from fsiwork.netcdf import Writer, written
+from fsiwork.netcdf import Writer, opened, written
 
-__all__ = ["VARIABLES", "open_run", "to_dataset", "write"]
+__all__ = ["VARIABLES", "axis_names", "join", "open_run", "open_study", "tabulate", "to_dataset", "write"]
 
 CONVENTIONS = "CF-1.11 SGRID-0.3"
 BOOK = (
@@ -54,9 +56,14 @@ def write(
     keep = True
     try:
         cost = provenance.Cost(store.meta.get("seconds", 0.0), store.meta.get("cpu_seconds", 0.0))
-        ended, step = _collect(frames, scene, path, store, cost, every)
+        ended, step = store.meta.get("ended") or _collect(frames, scene, path, store, cost, every)
         if not ended.startswith("stopped"):
-            _assemble(store, scene, path, _attributes(scene, identity, ended))
+            try:
+                _assemble(store, scene, path, _attributes(scene, identity, ended))
+            except OSError:  # the frames are all there: with resume only the file is written
+                with suppress(OSError):
+                    store.keep_state({}, step, cost.spent() | {"ended": [ended, step]})
+                raise
             cost.write(path, int(np.prod(layout.geometry(scene).n)), step)
             keep = False
         return ended
@@ -66,23 +73,21 @@ def write(
 
 def _collect(frames, scene, path: Path, store: Store, cost, every: float) -> tuple[str, int]:
     """Store the frames; returns how the run ended and after which step."""
-    grid = layout.geometry(scene)
-    pending = {k.removeprefix("gauge:"): v for k, v in (store.state or {}).items() if k.startswith("gauge:")}
+    grid, data = layout.geometry(scene), layout.plain(scene)
+    pending = _part(store.state or {}, "gauge:")
     if callable(frames):
-        state = {k.removeprefix("state:"): v for k, v in (store.state or {}).items() if k.startswith("state:")}
-        frames = frames(scene, resume=state or None)
+        frames = frames(scene, resume=_part(store.state or {}, "state:") or None)
     saved = time.monotonic()
     for frame in frames:
-        gauges = {
-            k: np.concatenate([pending[k], v]) if k in pending else np.asarray(v) for k, v in frame.gauges.items()
-        }
         stopped = frame.ended.startswith("stopped")
+        gauges = {k: np.concatenate([q[k] for q in (pending, frame.gauges) if k in q]) for k in pending | frame.gauges}
         if frame.step > store.last_step and not stopped:
-            arrays = _record(frame, gauges, grid, layout.plain(scene))
+            arrays = _record(frame, gauges, grid, data)
             if store.count == 0:
                 size = sum(value.nbytes for value in arrays.values())
-                need_space(path, 2.1 * size * (_expected(scene) + 1))
-            store.add(arrays, frame.step, {"t": frame.t, "step": frame.step})
+                need_space(path, 2.1 * size * (data["clock"]["frames"] + 1))
+            empty = frame.ended.startswith("diverged") and not frame.fields
+            store.add(arrays, frame.step, {"t": frame.t, "step": frame.step, "empty": empty})
             pending = gauges = {}
         if stopped or (not frame.ended and time.monotonic() - saved > every):
             held = {f"gauge:{k}": v for k, v in gauges.items()} if stopped else {}
@@ -94,9 +99,8 @@ def _collect(frames, scene, path: Path, store: Store, cost, every: float) -> tup
     raise RuntimeError("the frames stopped without saying how the run ended")
 
 
-def _expected(scene) -> int:
-    count = layout.plain(scene).get("clock", {}).get("frames", 1)
-    return count if isinstance(count, int) else len(count)
+def _part(arrays: dict[str, np.ndarray], prefix: str) -> dict[str, np.ndarray]:
+    return {k.removeprefix(prefix): v for k, v in arrays.items() if k.startswith(prefix)}
 
 
 def _record(frame, gauges: dict, grid: layout.Geometry, scene: dict) -> dict[str, np.ndarray]:
@@ -112,18 +116,20 @@ def _record(frame, gauges: dict, grid: layout.Geometry, scene: dict) -> dict[str
 
 def _assemble(store: Store, scene, path: Path, attributes: dict[str, str]) -> None:
     """The file of the run from the files of its frames, one in memory at a time."""
-    grid, count = layout.geometry(scene), store.count
+    grid = layout.geometry(scene)
+    words = [store.frame(k, "none")[1] for k in range(store.count)]
+    times = [word["t"] for word in words if not word["empty"]]
     first, _ = store.frame(0)
-    need = sum(value.nbytes for value in first.values()) * count * 1.02 + 1e5
+    need = sum(value.nbytes for value in first.values()) * len(times) * 1.02 + 1e5
     with written(path, attributes, need) as out:
         _axes(out, grid)
-        out.dimension("t", count)
+        out.dimension("t", len(times))
         out.variable("t", ("t",), "f8", layout.described("t"))
-        out.put("t", [store.frame(k, "none")[1]["t"] for k in range(count)])
+        out.put("t", times)
         names = _declare_fields(out, first, grid)
         _gauges(out, store)
-        _contours(out, store, first)
-        for k in range(count):
+        _contours(out, store, first, len(times))
+        for k in range(len(times)):
             arrays, _ = store.frame(k, "field:")
             for key, name in names.items():
                 out.put(name, arrays[key], k)
@@ -186,26 +192,23 @@ def _label(out: Writer, dim: str, size: int) -> None:
 
 
 def _gauges(out: Writer, store: Store) -> None:
-    parts = [store.frame(k, "gauge:")[0] for k in range(store.count)]
-    names = [key for key in parts[0] if key != "gauge:t"]
-    times = np.concatenate([part["gauge:t"] for part in parts]) if "gauge:t" in parts[0] else np.zeros(0)
+    parts = [_part(store.frame(k, "gauge:")[0], "gauge:") for k in range(store.count)]
+    columns = {k: np.concatenate([part[k] for part in parts if k in part]) for part in parts for k in part}
+    times = columns.pop("t", np.zeros(0))
     out.dimension("t_step", len(times))
     out.variable("t_step", ("t_step",), "f8", layout.described("t_step"))
     out.put("t_step", times)
-    for key in names:
-        values = np.concatenate([part[key] for part in parts])
-        name, dims = key.removeprefix("gauge:"), ("t_step",)
-        if values.ndim == 2:
+    for name, values in columns.items():
+        if values.ndim > 1:
             _label(out, "body", values.shape[1])
-            dims = ("t_step", "body")
-        out.variable(name, dims, "f8", layout.described(name))
+        out.variable(name, ("t_step", "body")[: values.ndim], "f8", layout.described(name))
         out.put(name, values)
 
 
-def _contours(out: Writer, store: Store, first: dict) -> None:
+def _contours(out: Writer, store: Store, first: dict, frames: int) -> None:
     if "contour:x" not in first:
         return
-    parts = [store.frame(k, "contour:")[0] for k in range(store.count)]
+    parts = [store.frame(k, "contour:")[0] for k in range(frames)]
     count = [len(part["contour:x"]) for part in parts]
     out.dimension("point", sum(count))
     out.variable("contour_count", ("t",), "i4", layout.described("contour_count") | {"sample_dimension": "point"})
@@ -220,17 +223,20 @@ def open_run(path: str | Path) -> xr.Dataset:
 
     Raises FileNotFoundError or ValueError, in one line, when it is missing, not netCDF, or not a finished run.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise FileNotFoundError(f"{path}: no such file")
-    try:
-        found = xr.open_dataset(path, engine="netcdf4")
-    except (OSError, RuntimeError, ValueError, AttributeError) as error:
-        raise ValueError(f"{path}: not a netCDF file, or a damaged one ({type(error).__name__})") from error
-    if missing := [name for name in ("scene", "source_hash", "ended") if name not in found.attrs]:
-        found.close()
-        raise ValueError(f"{path}: not a finished run of fsiwork (no attribute {missing[0]!r})")
-    return found
+    with opened(Path(path)) as file:
+        if "scene" not in file.ncattrs():
+            raise ValueError(f"{path}: not a run of fsiwork (no attribute 'scene')")
+    return xr.open_dataset(path, engine="netcdf4")
+
+
+def open_study(path: str | Path) -> xr.Dataset:
+    """Open a study's file as lazy arrays, a chunk a frame of a point, computed in this thread (netCDF-C is not safe
+    in several). Raises as `open_run` does."""
+    import dask
+
+    with opened(Path(path)):
+        dask.config.set(scheduler="synchronous")
+    return xr.open_dataset(path, engine="netcdf4", chunks={})
 
 
 def to_dataset(frames: Callable[..., Iterable] | Iterable, scene: Any) -> xr.Dataset:

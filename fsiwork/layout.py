@@ -44,11 +44,13 @@ VARIABLES = {
     "elastic_energy": Variable("elastic energy", "step"),
     "dissipation": Variable("rate of viscous dissipation", "step"),
     "power": Variable("rate of work of gravity, walls and inflow", "step"),
-    "energy_residual": Variable("rate of energy that the balance misses", "step"),
+    "energy_residual": Variable("energy that the balance missed since the row before", "step"),
     "momentum_x": Variable("momentum along x", "step"),
     "momentum_y": Variable("momentum along y", "step"),
     "momentum_z": Variable("momentum along z", "step"),
     "max_divergence": Variable("largest divergence of the velocity", "step"),
+    "ended": Variable("how the run ended", "point of a study"),
+    "scene": Variable("scene of the run", "point of a study"),
     "max_speed": Variable("largest speed", "step"),
 }
 

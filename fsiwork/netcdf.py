@@ -24,17 +24,20 @@ class Writer:
         if name not in self.file.dimensions:
             self.file.createDimension(name, size or None)  # a fixed size of 0 would mean unlimited anyway
 
-    def variable(self, name: str, dims: tuple[str, ...], dtype: Any, attributes: dict, whole: int = 0) -> None:
-        """Declare a variable: compressed (zlib 1, shuffle) if it has dimensions, never with a fill value.
+    def variable(
+        self, name: str, dims: tuple[str, ...], dtype: Any, attributes: dict, whole: int = 0, fill: Any = False
+    ) -> None:
+        """Declare a variable: compressed (zlib 1, shuffle) if it has dimensions, as a rule without a fill value.
 
-        One chunk holds one index of the first ``whole`` dimensions and everything of the others.
+        One chunk holds one index of the first ``whole`` dimensions and everything of the others. With ``fill``
+        what is never put reads as that value.
         """
         sizes = [max(len(self.file.dimensions[d]), 1) for d in dims]
         chunks = [1] * whole + sizes[whole:] if dims else None
         text = dtype is str
         packed = {} if text or not dims else {"compression": "zlib", "complevel": 1, "shuffle": True}
         target = self.file.createVariable(
-            name, dtype, dims, fill_value=None if text else False, chunksizes=chunks, **packed
+            name, dtype, dims, fill_value=None if text else fill, chunksizes=chunks, **packed
         )
         target.setncatts(attributes)
 
@@ -57,6 +60,24 @@ def _hash(values: np.ndarray) -> str:
     if values.dtype == object:
         return repr(values.tolist())
     return hashlib.sha256(np.ascontiguousarray(values)).hexdigest()
+
+
+def opened(path: Path) -> netCDF4.Dataset:
+    """Open a file that fsiwork wrote, for reading, values as they are.
+
+    Raises FileNotFoundError or ValueError, in one line, when it is missing, not netCDF, or not finished.
+    """
+    if not path.is_file():
+        raise FileNotFoundError(f"{path}: no such file")
+    try:
+        found = netCDF4.Dataset(path)
+    except (OSError, RuntimeError) as error:
+        raise ValueError(f"{path}: not a netCDF file, or a damaged one") from error
+    found.set_auto_maskandscale(False)
+    if missing := [name for name in ("source_hash", "ended") if name not in found.ncattrs()]:
+        found.close()
+        raise ValueError(f"{path}: not a finished file of fsiwork (no attribute {missing[0]!r})")
+    return found
 
 
 @contextmanager

@@ -20,7 +20,12 @@ from typing import Any, TypeVar
 
 PACKAGE = Path(__file__).resolve().parent
 RUN = ("core", "bodies", "scene", "simulate", "dataset")  # what the numbers of a run depend on
-ALSO = {"scene": ("scene", "specs"), "dataset": ("dataset", "layout", "netcdf", "checkpoint")}  # of several modules
+ALSO = {  # layers of several modules
+    "scene": ("scene", "specs"),
+    "simulate": ("simulate", "build"),
+    "dataset": ("dataset", "layout", "netcdf", "checkpoint"),
+    "studies": ("studies", "joining"),
+}
 NUMERICS = ("numpy", "scipy", "numba")
 SHELLS = {"sh", "bash", "dash", "zsh", "ksh", "fish", "tcsh"}
 T = TypeVar("T")
