@@ -101,15 +101,12 @@ class Spec(BaseModel):
         if not isinstance(data, Mapping):
             return Nothing()
         values = {name: _sound(cls, name, data[name], name in faulty) for name in set(cls.model_fields) & set(data)}
-        part = cls.model_construct(**{name: value for name, value in values.items() if value is not ABSENT})
         for name, field in cls.model_fields.items():
-            if values.get(name) is ABSENT or (name not in values and name in faulty):
-                part.__dict__.pop(name, None)
-            elif name not in values and field.default_factory:
-                try:
-                    part.__dict__[name] = field.default_factory(part.__dict__)
-                except KeyError:  # made from a field that is not there
-                    part.__dict__.pop(name, None)
+            if name not in values:
+                values[name] = ABSENT if name in faulty or field.is_required() else _default(field, values)
+        part = cls.model_construct(**values)
+        for name in [name for name, value in values.items() if value is ABSENT]:
+            del part.__dict__[name]
         return part
 
     def __getattr__(self, name):
@@ -120,6 +117,15 @@ class Spec(BaseModel):
 
 
 ABSENT = object()
+
+
+def _default(field, values: dict):
+    """The default of a field; ABSENT when it is made from a field that is not there."""
+    made_from = {name: value for name, value in values.items() if value is not ABSENT}
+    try:
+        return field.get_default(call_default_factory=True, validated_data=made_from)
+    except KeyError:
+        return ABSENT
 
 
 @cache
@@ -151,7 +157,8 @@ def _part(annotation, metadata, value):
         return _part(inner, more, value)
     if get_origin(annotation) is tuple and isinstance(value, list | tuple):
         item, *rest = get_args(annotation)
-        return tuple(_item(item, each) for each in value) if rest == [...] else ABSENT
+        specs = rest == [...] and any(isinstance(m, WrapValidator) for m in getattr(item, "__metadata__", ()))
+        return tuple(_item(item, each) for each in value) if specs else ABSENT
     for cls in (annotation, *get_args(annotation)):
         if isinstance(cls, type) and issubclass(cls, Spec) and cls.divisible and isinstance(value, Mapping):
             faulty = _faulty(cls, value)
