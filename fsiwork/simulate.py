@@ -1,4 +1,4 @@
-"""From a scene to states: `build`, `step`, `frames`. What is done with the states (files, progress, tests) is elsewhere."""
+"""From a scene to states: `build`, `step`, `frames`. Files, progress and tests are consumers of the states."""
 
 import math
 import time
@@ -67,8 +67,8 @@ def longest_step(flow: Flow, bodies: tuple[Body, ...]) -> dict[str, float]:
 class Frame:
     """One moment of a run.
 
-    ``fields``: name -> (face axis or None for centres, interior array with axes x, y[, z]); ``gauges``: one row a step since
-    the frame before; ``state()``: all that the next step reads; ``ended``: "" while the run goes on.
+    ``fields``: name -> (face axis or None for centres, interior array with axes x, y[, z]); ``gauges``: one row a step
+    since the frame before; ``state()``: all that the next step reads; ``ended``: "" while the run goes on.
     """
 
     t: float

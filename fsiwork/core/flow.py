@@ -38,6 +38,7 @@ class Flow:
         self.u = [grid.field() for _ in grid.axes]
         self.p, self.before = grid.field(), grid.field()
         self.dt_old = 0.0  # no history yet: the first step is Euler's
+        self.guess: list[np.ndarray] | None = None  # velocity of the pass before, in iterated steps
         self.rho = self.mu = None  # None: constant
         self.stiffness = 0.0
         self._star = [grid.field() for _ in grid.axes]
@@ -92,6 +93,7 @@ class Flow:
         else:
             kappa = 0.5 * dt * self.viscosity / self.density if self.implicit else 0.0
         kappa += self.stiffness * dt**2
+        self.dt = dt
         for c in self.grid.axes:
             self._explicit_part(c, dt, increment=kappa > 0.0)
         for c in self.grid.axes:
@@ -167,6 +169,9 @@ class Flow:
         """u* = u + (1 - κΔ)⁻¹ increment, on the faces inside."""
         start, n, shape = self._rows[c]
         d = self._compact(c, shape)
+        if self.guess is not None:
+            pull = -self.stiffness * (self.dt / self.grid.h) ** 2
+            kernels.add_laplacian(self._star[c], self.u[c], self.guess[c], start, n, self.grid.strides, pull)
         kernels.gather(d.reshape(-1), self._star[c], start, n)
         if self.stiffness == 0.0 and kappa <= LINES_UP_TO * self.grid.h**2:
             d = self._solver("lines", c, shape).solve(d, kappa)
