@@ -1,17 +1,17 @@
 """An elastic membrane (or a drop) immersed in the fluid: it reacts to its change of area (Chapter 3)."""
 
-import copy
 from collections.abc import Callable
 
 import numpy as np
 
+from fsiwork.bodies.backward import BackwardMap
 from fsiwork.bodies.band import Band
 from fsiwork.bodies.body import Body
-from fsiwork.bodies.extent import half_extent
+from fsiwork.bodies.inside import Inside
 from fsiwork.bodies.laws import LINEAR, AtPoints, Law
 from fsiwork.bodies.pull import Pull
 from fsiwork.core.edges import Edges
-from fsiwork.core.grid import GHOSTS, Grid
+from fsiwork.core.grid import Grid
 from fsiwork.core.kernels import interface as kernels
 from fsiwork.core.poisson import Direct
 from fsiwork.core.transport import Transport
@@ -42,7 +42,8 @@ class Membrane(Body):
 
     Attributes
     ----------
-    phi : flat field at centres; Y : flat fields of the backward map, empty unless carried
+    phi : flat field at centres
+    map : the backward map, or None
     guess : φ of the last pass of an iteration; while it is set, the force is taken there
 
     Raises
@@ -78,13 +79,12 @@ class Membrane(Body):
         self.form, self.dirac, self.guess = form, dirac, None
         self._distance, self._stretch = phi0, float(stretch)
         self.phi = grid.field(transport.dtype)
-        self.Y = [grid.sample(lambda *x, a=a: x[a], dtype=transport.dtype) for a in grid.axes if carry == "map"]
-        self._carriers = [self._carrier(a) for a in grid.axes if carry == "map"]
-        if not callable(phi0):
-            self.phi[:] = phi0
+        self.map = BackwardMap(grid, edges, transport) if carry == "map" else None
+        if callable(phi0):
+            self._from_distance(self.map.home() if self.map else grid.points())
         else:
-            self._from_map(grid.points())
-        edges.fill_scalar(self.phi, "linear")
+            self.phi[:] = phi0
+            edges.fill_scalar(self.phi, "linear")
         self._plan()
 
     # --- verbs ------------------------------------------------------------------------------------------------
@@ -114,11 +114,9 @@ class Membrane(Body):
 
     def move(self, flow, dt: float) -> None:
         """Carry φ, or Y and then φ = φ₀(Y), with ``flow.u`` (3.64)."""
-        for carrier, Y in zip(self._carriers, self.Y, strict=True):
-            carrier.advance([Y], flow.u, dt, "linear")
-        if self.Y:
-            self._from_map([self.grid.padded(Y) for Y in self.Y])
-            self.edges.fill_scalar(self.phi, "linear")
+        if self.map:
+            self.map.move(flow.u, dt)
+            self._from_distance(self.map.home())
         else:
             self.transport.advance([self.phi], flow.u, dt, "linear")
         self._fresh = False
@@ -140,30 +138,28 @@ class Membrane(Body):
 
     def state(self) -> dict[str, np.ndarray]:
         """φ, and Y if it is carried."""
-        return {"phi": self.phi.copy()} | {f"map_{XYZ[a]}": Y.copy() for a, Y in enumerate(self.Y)}
+        return {name: q.copy() for name, q in self._named().items()}
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Take back a `state`."""
-        self.phi[:] = state["phi"]
-        for a, Y in enumerate(self.Y):
-            Y[:] = state[f"map_{XYZ[a]}"]
+        for name, q in self._named().items():
+            q[:] = state[name]
         self._fresh = False
 
     def fields(self) -> dict[str, tuple[tuple[int, ...] | None, np.ndarray]]:
         """φ and the components of Y at centres, views without ghosts."""
-        named = {"phi": self.phi} | {f"map_{XYZ[a]}": Y for a, Y in enumerate(self.Y)}
-        return {name: (None, self.grid.inside(q)) for name, q in named.items()}
+        return {name: (None, self.grid.inside(q)) for name, q in self._named().items()}
 
     def gauges(self, flow) -> dict[str, float]:
         """Volume ∫1 - H_ε(φ) (kept by the flow), length (2D) or area (3D), elastic energy, centroid, half-extents
         along the lines through it, extremes of the stretch where D_ε > 0."""
-        values, g = self.survey(), self.grid
-        volume, centre = self._volume()
-        out = {"volume": volume, "length" if g.dim == 2 else "area": float(values[kernels.LENGTH])}
+        values, measure = self.survey(), "length" if self.grid.dim == 2 else "area"
+        volume, centre = self._inside.volume(self.phi, self._band_now())
+        out = {"volume": volume, measure: float(values[kernels.LENGTH])}
         out |= {"elastic_energy": float(values[kernels.ENERGY])}
-        for a in g.axes:
+        for a in self.grid.axes:
             out[f"centroid_{XYZ[a]}"] = centre[a]
-            out[f"axis_{XYZ[a]}"] = half_extent(g, self.edges, self.phi, centre, a) if volume > 0.0 else 0.0
+            out[f"axis_{XYZ[a]}"] = self._inside.half_extent(self.phi, centre, a) if volume > 0.0 else 0.0
         return out | {"stretch_min": float(values[kernels.LEAST]), "stretch_max": float(values[kernels.MOST])}
 
     def survey(self) -> np.ndarray:
@@ -214,31 +210,15 @@ class Membrane(Body):
         self._other = self._solver = None
         self._fresh, self._values, self._table = False, None, np.zeros((0, 8))
         self._s = np.array([*g.strides, 0][:3])
-        self._sums = np.zeros((g.rows()[0].size, 3))
-        # Centroid: the mean, or in a periodic direction the angle of the mean of exp(2πi x/L).
-        angles = [2.0 * np.pi * (g.coordinate(a) - g.origin[a]) / g.length[a] for a in g.axes]
-        self._weights = [
-            np.array([np.cos(angles[a]), np.sin(angles[a])])
-            if self.edges.periodic(a)
-            else np.array([g.coordinate(a), np.zeros(g.n[a])])
-            for a in g.axes
-        ]
+        self._inside = Inside(g, self.edges, self.eps)
 
-    def _carrier(self, a: int) -> Transport:
-        """A transport that shares its scratch; along its own periodic direction Y grows by the period."""
-        if not self.edges.periodic(a):
-            return self.transport
-        carrier = copy.copy(self.transport)
-        carrier.edges = MapEdges(self.edges, a)
-        return carrier
+    def _named(self) -> dict[str, np.ndarray]:
+        Y = self.map.Y if self.map else ()
+        return {"phi": self.phi} | {f"map_{XYZ[a]}": q for a, q in enumerate(Y)}
 
-    def _from_map(self, Y):
-        """φ = stretch · distance(Y), Y taken back into a periodic box."""
-        g = self.grid
-        Y = [
-            np.mod(q - g.origin[a], g.length[a]) + g.origin[a] if self.edges.periodic(a) else q for a, q in enumerate(Y)
-        ]
-        g.padded(self.phi)[...] = self._stretch * self._distance(*Y)
+    def _from_distance(self, x):
+        self.grid.padded(self.phi)[...] = self._stretch * self._distance(*x)
+        self.edges.fill_scalar(self.phi, "linear")
 
     def _band_now(self) -> Band:
         if not self._fresh:
@@ -263,38 +243,3 @@ class Membrane(Body):
         damping = mu * self.eps
         root = np.sqrt(damping**2 + 0.5 * T * self._least_density(flow) * self.eps * self.grid.h**2)
         return float((damping + root) / T)
-
-    def _volume(self) -> tuple[float, tuple[float, ...]]:
-        """∫χ and ∫xχ/∫χ, χ = 1 - H_ε(φ)."""
-        g, band, (start, n) = self.grid, self._band_now(), self.grid.rows()
-        kernels.inside_sums(self._sums, self.phi, start, n, band.flags, band.row, self._weights[-1], self.eps)
-        total = float(self._sums[:, 0].sum())
-        if total == 0.0:
-            return 0.0, (np.nan,) * g.dim
-        rows, moments = self._sums[:, 0].reshape(g.n[:-1]), []
-        for a in g.axes[:-1]:
-            line = rows.sum(axis=tuple(b for b in range(rows.ndim) if b != a))
-            moments.append(self._weights[a] @ line)
-        moments.append(self._sums[:, 1:].sum(axis=0))
-        return total * g.cell_volume, tuple(self._mean(a, m, total) for a, m in enumerate(moments))
-
-    def _mean(self, a, moment, total) -> float:
-        g = self.grid
-        if not self.edges.periodic(a):
-            return float(moment[0] / total)
-        return float(g.origin[a] + np.arctan2(moment[1], moment[0]) % (2.0 * np.pi) * g.length[a] / (2.0 * np.pi))
-
-
-class MapEdges:
-    """Ghosts of component ``a`` of the backward map in a box that is periodic along ``a``: Y(x + L) = Y(x) + L."""
-
-    def __init__(self, edges: Edges, a: int):
-        self.edges, self.a = edges, a
-
-    def fill_scalar(self, Y: np.ndarray, rule: str) -> None:
-        """As `Edges.fill_scalar`, with the period added."""
-        self.edges.fill_scalar(Y, rule)
-        g = self.edges.grid
-        lines = np.moveaxis(g.padded(Y), self.a, 0)
-        lines[:GHOSTS] -= g.length[self.a]
-        lines[-GHOSTS:] += g.length[self.a]

@@ -1,4 +1,4 @@
-"""The force of a membrane (3.18) in three discrete forms; which one is stable depends on the law (MEASURED-coupling 2)."""
+"""The force of a membrane (3.18) in three discrete forms; the law says which is stable (MEASURED-coupling 2)."""
 
 import numpy as np
 
