@@ -42,23 +42,31 @@ def show(ds: xr.Dataset, path: str | Path) -> Path:
 
 def overview(ds: xr.Dataset) -> Figure:
     """The first, middle and last frame of up to three fields, and below them the gauges over time."""
-    names = [name for name in FIELDS if _plane(ds, name, 0) is not None][:3]
+    names = _drawable(ds)
     panels = _gauge_panels(ds)
     if not names and not panels:
         raise ValueError("the run has neither fields nor gauges to draw")
-    last = ds.sizes["t"] - 1 if "t" in ds.sizes else 0
-    frames = sorted({0, last // 2, last}) if names else []
-    columns, rows = max(len(frames), len(panels)), len(names) + bool(panels)
-    tall = _aspect(ds) if names else 1.0
-    figure = Figure(figsize=(3.1 * columns, 2.7 * min(max(tall, 0.5), 1.8) * len(names) + 2.4 * bool(panels) + 0.4))
-    heights = [min(max(tall, 0.5), 1.8)] * len(names) + [0.9] * bool(panels)
-    cells = figure.add_gridspec(rows, columns, height_ratios=heights)
-    for row, name in enumerate(names):
-        _field_row(figure, [figure.add_subplot(cells[row, k]) for k in range(len(frames))], ds, name, frames)
-    for k, panel in enumerate(panels):
-        _draw_gauges(figure.add_subplot(cells[rows - 1, k]), ds, panel)
+    last = ds.sizes.get("t", 1) - 1
+    frames = sorted({0, last // 2, last})
+    tall = 2.6 * min(max(_aspect(ds), 0.4), 1.6) if names else 0.0
+    heights = [height for height in (len(names) * (tall + 0.35), 2.3 * bool(panels)) if height]
+    figure = Figure(figsize=(3.1 * (len(frames) if names else len(panels)) + 0.5, sum(heights) + 0.4))
+    parts = list(np.ravel(figure.subfigures(len(heights), 1, height_ratios=heights)))
+    if names:
+        axes = parts.pop(0).subplots(len(names), len(frames), squeeze=False)
+        for row, name in zip(axes, names, strict=True):
+            _field_row(row, ds, name, frames)
+    if panels:
+        for ax, panel in zip(parts[0].subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
+            _draw_gauges(ax, ds, panel)
     figure.suptitle(_title(ds), fontsize=10, x=0.01, ha="left")
     return figure
+
+
+def _drawable(ds: xr.Dataset) -> list[str]:
+    """Fields that the file can give, at most three; φ only where nothing else is (its zero line is drawn anyway)."""
+    names = [name for name in FIELDS if _plane(ds, name, 0) is not None]
+    return [name for name in names if name != "phi" or names == ["phi"]][:3]
 
 
 def _title(ds: xr.Dataset) -> str:
@@ -124,7 +132,7 @@ def _interface(ax, ds: xr.Dataset, frame: int, name: str):
     return ax.contour(ds["x_c"].values, ds["y_c"].values, phi, levels=[0.0], colors=colour, linewidths=1.2)
 
 
-def _field_row(figure: Figure, axes: list, ds: xr.Dataset, name: str, frames: list[int]) -> None:
+def _field_row(axes, ds: xr.Dataset, name: str, frames: list[int]) -> None:
     planes = [_plane(ds, name, frame) for frame in frames]
     limits = _range(planes, FIELDS[name][1] is style.DIVERGING)
     for ax, frame, values in zip(axes, frames, planes, strict=True):
@@ -133,7 +141,7 @@ def _field_row(figure: Figure, axes: list, ds: xr.Dataset, name: str, frames: li
         ax.set_title(
             f"{FIELDS[name][0]}, t = {float(ds['t'][frame]):.4g}" + (", mid-plane" if "z_c" in ds.dims else "")
         )
-    figure.colorbar(image, ax=axes, shrink=0.85, pad=0.01)
+    axes[0].figure.colorbar(image, ax=list(axes), shrink=0.85, pad=0.01)
 
 
 def _gauge_panels(ds: xr.Dataset) -> list[tuple[str, list[str], bool]]:
@@ -163,9 +171,10 @@ def _draw_gauges(ax, ds: xr.Dataset, panel: tuple[str, list[str], bool]) -> None
 
 def _film(ds: xr.Dataset, path: Path) -> Path:
     """The first field of the run, frame by frame (at most 60 of them), ten a second."""
-    name = next((name for name in FIELDS if _plane(ds, name, 0) is not None), None)
-    if name is None:
+    names = _drawable(ds)
+    if not names:
         raise ValueError("the run has no fields to make a film of")
+    name = names[0]
     frames = np.unique(np.linspace(0, ds.sizes["t"] - 1, min(ds.sizes["t"], LONGEST_FILM)).round().astype(int))
     limits = _range([_plane(ds, name, frame) for frame in frames], FIELDS[name][1] is style.DIVERGING)
     figure = Figure(figsize=(4.2, 0.7 + 3.6 * min(max(_aspect(ds), 0.3), 2.0)), dpi=90)

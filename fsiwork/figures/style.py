@@ -116,13 +116,14 @@ def note(figure: Figure, datasets: Mapping[str, Any] | Iterable[Any], text: str 
 def save(figure: Figure, path: str | Path, largest: int = 150_000) -> Path:
     """Write a PNG of at most ``largest`` bytes, the same bytes for the same figure (no date, no version), whole or not.
 
-    A picture that is too large gets a palette of 256 colours, and then fewer pixels, by 0.8 at a time.
+    A picture that is too large is drawn with fewer pixels, then with a palette of 256 colours, then both, ever smaller.
     """
-    path, dpi = Path(path), float(DPI)
-    data = _png(figure, dpi)
-    while len(data) > largest and dpi > 40:
-        data = _png(figure, dpi, palette=True)
-        dpi *= 0.8
+    path = Path(path)
+    tries = [(DPI, False), (0.8 * DPI, False), *((DPI * 0.8**k, True) for k in range(7))]
+    for dpi, palette in tries:
+        data = _png(figure, dpi, palette)
+        if len(data) <= largest:
+            break
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     part.write_bytes(data)
