@@ -1,0 +1,248 @@
+"""What a run takes: fields, solvers, memory, steps, time; and the refusal of what does not fit into memory.
+
+Arithmetic on the scene alone: nothing of the solver is loaded.
+"""
+
+import math
+from dataclasses import dataclass
+
+from fsiwork.scene import Membrane, Scene, SceneError
+
+GHOSTS = 3  # as in core.grid, which this module does not load
+SHARE = 0.8  # of the available memory
+PROCESS = 270e6  # bytes of Python, NumPy, SciPy, Numba, xarray and the compiled kernels
+
+# CPU time by stage: (2D, 3D) in ns a cell and step, one core, cells in cache; the last column is ns a step.
+# Measured with `frames` on the scenes of this repository (2 to 3 GHz class cores; a factor of two either way).
+COST = {
+    "advection none": (2.5, 6.0, 5e3),
+    "advection central": (3.5, 9.0, 5e3),
+    "advection upwind5": (6.5, 17.0, 5e3),
+    "pressure, direct": (7.0, 14.0, 4e4),
+    "pressure, multigrid": (900.0, 1600.0, 2e6),
+    "diffusion, lines": (5.0, 12.0, 3e4),
+    "diffusion, direct": (14.0, 42.0, 6e4),
+    "mixture": (30.0, 90.0, 5e4),
+    "transport of a field": (14.0, 35.0, 3e4),
+    "φ from the map": (25.0, 60.0, 5e4),
+    "force": (11.0, 30.0, 8e4),
+    "prediction of φ, direct": (11.0, 22.0, 4e4),
+    "gauges": (8.0, 16.0, 1e5),
+}
+START = 3.0  # seconds to load everything, kernels from the cache
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a run takes.
+
+    ``fields``: (what, how many, bytes of all of them); ``solvers``: (for what, which, bytes); ``bytes``: the peak of
+    the process; ``stages``: (what, seconds over the run); ``seconds``: CPU time of the run on one core.
+    """
+
+    cells: tuple[int, ...]
+    fields: tuple[tuple[str, int, int], ...]
+    solvers: tuple[tuple[str, str, int], ...]
+    bytes: int
+    step: float
+    steps: int
+    stages: tuple[tuple[str, float], ...]
+    seconds: float
+    output_bytes: int
+
+
+def estimate(scene: Scene) -> Plan:
+    """Plan of a scene. Numbers of bytes and steps are counted, seconds are estimated (factor of two)."""
+    box = scene.box
+    padded = 8 * math.prod(k + 2 * GHOSTS for k in box.n)
+    compact = 8 * math.prod(box.n)
+    step = _step(scene)
+    steps = math.ceil(scene.clock.end / step - 1e-9)
+    fields = tuple((what, count, count * padded) for what, count in _fields(scene) if count)
+    solvers = tuple((what, which, int(share * compact)) for what, which, share in _solvers(scene, step))
+    stages = tuple((what, steps * _nanoseconds(what, count, box.n) * 1e-9) for what, count in _stages(scene, solvers))
+    frame = _frame_bytes(scene, compact)
+    state = (3 * box.dim + 2) * padded + sum(_carried(body, box.dim) for body in scene.bodies) * padded
+    memory = PROCESS + sum(b for *_, b in fields) + sum(b for *_, b in solvers) + max(state, 2 * frame)
+    return Plan(
+        box.n,
+        fields,
+        solvers,
+        int(memory),
+        step,
+        steps,
+        stages,
+        START + sum(seconds for _, seconds in stages),
+        frame * (scene.clock.frames + 1),
+    )
+
+
+def refuse(scene: Scene) -> None:
+    """Raise `SceneError` when a run needs more than 80 % of the memory that is available now."""
+    import psutil
+
+    need, free = estimate(scene).bytes, psutil.virtual_memory().available
+    if need > SHARE * free:
+        raise SceneError(
+            f"box.cells: the run needs {size(need)}, more than {SHARE:.0%} of the {size(free)} that are available"
+        )
+
+
+def describe(plan: Plan) -> str:
+    """The plan as text."""
+    lines = [f"cells      {' × '.join(map(str, plan.cells))} = {math.prod(plan.cells):,}"]
+    lines += [f"field      {what:<28} {count:>3}  {size(b):>9}" for what, count, b in plan.fields]
+    lines += [f"solver     {what:<28} {which:<22} {size(b):>9}" for what, which, b in plan.solvers]
+    lines += [f"memory     {size(plan.bytes)}, of which {size(PROCESS)} for the process itself"]
+    lines += [f"steps      {plan.steps:,} of {plan.step:.6g}"]
+    lines += [f"stage      {what:<28} {duration(s):>9}" for what, s in plan.stages]
+    lines += [f"time       about {duration(plan.seconds)} on one core (within a factor of two or three)"]
+    lines += [f"output     up to {size(plan.output_bytes)} of fields before compression"]
+    return "\n".join(lines)
+
+
+def size(count: float) -> str:
+    """Bytes in words."""
+    for unit in ("B", "kB", "MB", "GB", "TB", "PB"):
+        if count < 999.5 or unit == "PB":
+            return f"{count:.3g} {unit}"
+        count /= 1000
+    raise AssertionError("unreachable")
+
+
+def duration(seconds: float) -> str:
+    """A time in words."""
+    for limit, unit, name in ((0.1, 1e-3, "ms"), (100, 1, "s"), (6000, 60, "min"), (172800, 3600, "h")):
+        if seconds < limit:
+            return f"{seconds / unit:.3g} {name}"
+    return f"{seconds / 86400:.3g} days"
+
+
+def _variable(scene: Scene) -> bool:
+    return any(body.inside or body.surface_mass for body in scene.bodies)
+
+
+def _carried(body: Membrane, dim: int) -> int:
+    return 1 + dim * (body.transport.carry == "map")
+
+
+def _fields(scene: Scene) -> list[tuple[str, int]]:
+    """(what, how many padded fields), as core.flow, core.transport and bodies.membrane allocate them."""
+    dim, fluid = scene.box.dim, scene.fluid
+    found = [("velocity: now, next, rate", 3 * dim), ("pressure, viscosity", 3), ("force", dim * bool(scene.bodies))]
+    if _variable(scene):
+        other = any(b.inside and b.inside.viscosity != fluid.viscosity for b in scene.bodies)
+        found += [("mixture: ρ, μ, 1/ρ on faces, ψ", dim + 2 + other), ("force", 0 if scene.bodies else dim)]
+    for i, body in enumerate(scene.bodies):
+        carry = _carried(body, dim)
+        linear = getattr(body.energy, "kind", "") == "linear"
+        form = body.form if body.form != "auto" else "normal-tangential" if linear else "divergence"
+        pull = 1 + (form != "divergence") + dim * (form == "split")
+        copies = 2 + dim * (body.transport.dtype != "float64")
+        found += [(f"body {i}: φ{', Y' * (carry > 1)}", carry), (f"body {i}: tension, copies", pull + copies)]
+        if body.coupling == "semi-implicit":
+            found += [(f"body {i}: φ̃", 2)]
+        if carry > 1:
+            found += [(f"body {i}: φ₀(Y)", dim + 2)]
+    return found
+
+
+def _solvers(scene: Scene, step: float) -> list[tuple[str, str, float]]:
+    """(for what, which, bytes over those of one compact field)."""
+    dim, fluid, h = scene.box.dim, scene.fluid, scene.box.h
+    variable = _variable(scene)
+    found = [("pressure", "multigrid", 16.0) if variable else ("pressure", "direct", 2.5)]
+    stabilised = any(body.coupling in ("stabilised", "iterated") for body in scene.bodies)
+    alpha = 0.0
+    if fluid.diffusion == "implicit":
+        nu = [(fluid.viscosity, fluid.density)]
+        nu += [(b.inside.viscosity, b.inside.density) for b in scene.bodies if b.inside]
+        worst = max(mu for mu, _ in nu) / min(rho for _, rho in nu) if variable else fluid.viscosity / fluid.density
+        alpha = (1.0 if variable else 0.5) * step * worst / h**2
+    if stabilised or alpha > 4.0:
+        found.append(("diffusion", "direct", 2.0 * dim))
+    elif alpha > 0.0:
+        found.append(("diffusion", "lines", 1.0 * dim))
+    for i, body in enumerate(scene.bodies):
+        if body.coupling == "semi-implicit":
+            found.append((f"body {i}: prediction of φ", "direct", 1.5))
+    return found
+
+
+def _stages(scene: Scene, solvers) -> list[tuple[str, float]]:
+    """(name in COST, how many times a step)."""
+    found = [(f"advection {scene.fluid.advection}", 1.0)]
+    passes = 2.0 if any(body.coupling == "iterated" for body in scene.bodies) else 1.0
+    for what, which, _ in solvers:
+        if "prediction" not in what:
+            found.append((f"{what}, {which}", 1.0))
+    if _variable(scene):
+        found.append(("mixture", 1.0))
+    for body in scene.bodies:
+        carry = _carried(body, scene.box.dim)
+        found += [("force", 1.0), ("transport of a field", float(carry - 1 or 1))]
+        if carry > 1:
+            found.append(("φ from the map", 1.0))
+        if body.coupling == "semi-implicit":
+            found.append(("prediction of φ, direct", 1.0))
+    totals: dict[str, float] = {}
+    for name, count in found:
+        totals[name] = totals.get(name, 0.0) + passes * count
+    totals["gauges"] = (1 + len(scene.bodies)) / scene.output.gauges_every
+    return list(totals.items())
+
+
+def _nanoseconds(what: str, count: float, n: tuple[int, ...]) -> float:
+    flat, solid, base = COST[what]
+    return count * (math.prod(n) * (flat if len(n) == 2 else solid) + base)
+
+
+def _frame_bytes(scene: Scene, compact: int) -> int:
+    dim, bodies = scene.box.dim, len(scene.bodies)
+    counts = {"u": dim, "phi": bodies, "Y": dim * bodies}
+    total = sum(counts.get(name, 1) for name in scene.output.fields)
+    return total * compact // (1 if scene.output.dtype == "float64" else 2)
+
+
+def _step(scene: Scene) -> float:
+    """Δt of the clock; for ``auto`` the limits at t = 0, with (1.54) for the bodies."""
+    if scene.clock.step != "auto":
+        return scene.clock.step
+    h, fluid, limits = scene.box.h, scene.fluid, [scene.clock.end]
+    speed = _speed(scene)
+    if speed > 0:
+        limits.append(0.5 * h / speed)
+    if fluid.diffusion == "explicit" and fluid.viscosity > 0:
+        limits.append(h**2 * fluid.density / (4 * scene.box.dim * fluid.viscosity))
+    for body in scene.bodies:
+        tension = _tension(body)
+        if tension > 0:
+            rho = min(fluid.density, body.inside.density) if body.inside else fluid.density
+            mu = min(fluid.viscosity, body.inside.viscosity) if body.inside else fluid.viscosity
+            eps = body.width.of(h)
+            limit = (mu * eps + math.hypot(mu * eps, math.sqrt(0.5 * tension * rho * eps) * h)) / tension
+            limits.append(limit * (1.0 if body.coupling == "explicit" else 4.0))
+    return min(scene.clock.end, scene.clock.safety * min(limits))
+
+
+def _tension(body: Membrane) -> float:
+    """s E'(s) and for a hardly stretched membrane its modulus, at the first stretch s."""
+    s, law = body.stretch, body.energy
+    kind = getattr(law, "kind", "")
+    if kind == "linear":
+        return s * law.stiffness
+    if kind == "quadratic":
+        return law.stiffness * max(s * (s - 1.0), s * s)
+    return max(float(s * law.dE(s)), float(s * s * law.ddE(s)))
+
+
+def _speed(scene: Scene) -> float:
+    """Sum over the directions of the largest velocity that the scene itself names."""
+    sides = [side for pair in scene.box.sides for side in pair]
+    speeds = [sum(map(abs, side.velocity)) for side in sides if hasattr(side, "velocity")]
+    initial = scene.fluid.initial
+    if initial.kind == "taylor-green":
+        speeds.append(2 * abs(initial.amplitude))
+    if initial.kind == "shear":
+        speeds.append(abs(initial.rate) * scene.box.length[1] / 2)
+    return max(speeds, default=0.0)
