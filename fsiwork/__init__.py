@@ -14,10 +14,11 @@ if TYPE_CHECKING:
 
 _PLACES = {"run": "running", "open_run": "dataset", "open_study": "dataset"}
 _SPECS = (
-    "Ball Block Box Capsule Cassini Clock Edges Ellipsoid Fluid FreeSlip Inflow Inside Intersection Law Linear Membrane "
-    "Minus Moved NoSlip Outflow Output Periodic Polygon Quadratic Rest Scene SceneError Shear Slot TaylorGreen Torus "
-    "Transport Union Wall Width load"
-).split()
+    "Ball", "Block", "Box", "Capsule", "Cassini", "Clock", "Edges", "Ellipsoid", "Fluid", "FreeSlip",
+    "Inflow", "Inside", "Intersection", "Law", "Linear", "Membrane", "Minus", "Moved", "NoSlip", "Outflow",
+    "Output", "Periodic", "Polygon", "Quadratic", "Rest", "Scene", "SceneError", "Shear", "Slot",
+    "TaylorGreen", "Torus", "Transport", "Union", "Wall", "Width", "load",
+)  # fmt: skip
 _PLACES |= dict.fromkeys(_SPECS, "scene")
 
 __all__ = ["Scene", "load", "open_run", "open_study", "run"]

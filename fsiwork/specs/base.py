@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
-from typing import Annotated, Any, ClassVar, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Literal, get_args, get_origin
 
 from pydantic import (
     BaseModel,
@@ -225,7 +225,11 @@ def one_of(*classes: type[Spec], short: bool = False):
     for cls in classes[1:]:
         union = union | cls
     kind = (Field(discriminator="kind"),) if len(classes) > 1 else ()
-    return Annotated[(union, *kind, WrapValidator(_Pick(classes, short)))]
+    pick = _Pick(classes, short)
+    if short:
+        alone = Literal[tuple(pick.kinds)]
+        return Annotated[(union, *kind, WrapValidator(pick, json_schema_input_type=union | alone))]
+    return Annotated[(union, *kind, WrapValidator(pick))]
 
 
 def finite(*values: float) -> bool:
