@@ -120,7 +120,8 @@ class Store:
         self.meta: dict[str, Any] = {}
         self.folder.mkdir(parents=True, exist_ok=True)
         self._hold()
-        for stray in [*path.parent.glob(f"{path.name}.tmp.*"), *self.folder.glob("*.tmp.*")]:
+        names = f"{path.name}.tmp.*", f"{path.stem}.cost.json.tmp.*", f"{self.folder.name}/*.tmp.*"
+        for stray in (file for name in names for file in path.parent.glob(name)):
             stray.unlink(missing_ok=True)
         try:
             if resume:
