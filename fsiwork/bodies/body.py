@@ -7,7 +7,15 @@ class Body:
     """Four verbs, called in this order in a step, and five answers. All empty here, so that absence costs nothing.
 
     ``flow`` is a `fsiwork.core.flow.Flow`; ``dt`` [time].
+
+    Attributes
+    ----------
+    passes : how often a step is taken, each pass from the same state, before it counts
+    guess : `state` after the last pass of an iteration, or None
     """
+
+    passes: int = 1
+    guess: dict[str, np.ndarray] | None = None
 
     def blend(self, flow, dt: float) -> None:
         """Mix own density and viscosity into ``flow.rho`` and ``flow.mu`` (3.19), (5.6)."""
@@ -32,8 +40,8 @@ class Body:
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Take back a `state`, bit by bit."""
 
-    def fields(self) -> dict[str, tuple[tuple[int, ...] | None, np.ndarray]]:
-        """What people want to see: name -> (face axes or None for centres, array without ghosts)."""
+    def fields(self) -> dict[str, np.ndarray]:
+        """What people want to see, by name: flat fields at centres."""
         return {}
 
     def gauges(self, flow) -> dict[str, float]:

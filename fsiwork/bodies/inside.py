@@ -30,11 +30,14 @@ class Inside:
             else np.array([grid.coordinate(a), np.zeros(grid.n[a])])
             for a in grid.axes
         ]
+        self._last = np.zeros((4, grid.n[-1] + 1))
+        self._last[:2, :-1] = self._moments[-1]
+        self._last[2:, 1:] = np.cumsum(self._moments[-1], axis=1)
 
     def volume(self, phi: np.ndarray, band: Band) -> tuple[float, tuple[float, ...]]:
         """∫χ [length^d] and the centroid ∫xχ/∫χ, χ = 1 - H_ε(φ); NaN for the centroid of nothing."""
         g, (start, n) = self.grid, self.grid.rows()
-        kernels.inside_sums(self._sums, phi, start, n, band.flags, band.row, self._moments[-1], self.eps)
+        kernels.inside_sums(self._sums, phi, start, n, band.flags, band.row, self._last, self.eps)
         total = float(self._sums[:, 0].sum())
         if not total > 0.0:
             return 0.0, (np.nan,) * g.dim
@@ -51,7 +54,7 @@ class Inside:
         return g.origin[a] + turn % 1.0 * g.length[a]
 
     def half_extent(self, phi: np.ndarray, centre: tuple[float, ...], a: int) -> float:
-        """Half the distance [length] of the two zeros of φ (flat, ghosts filled) next to ``centre`` along direction ``a``.
+        """Half the distance [length] of the two zeros of φ (flat, ghosts filled) next to ``centre`` along ``a``.
 
         φ is interpolated by cubics, across to the line and along it. If the centre lies outside (a crescent), the first
         and the last zero count; 0.0 if there are not two.

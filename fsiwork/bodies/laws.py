@@ -68,7 +68,7 @@ def modulus(A, B):
     stays positive for a membrane that is unstretched (A = 0: B/4) or compressed, where E'r gives nothing.
     """
     A, B = np.broadcast_arrays(np.asarray(A, float), np.asarray(B, float))
-    steep = B > 2.0 * A
+    steep = (B > 2.0 * A) & (B > 0.0)
     return np.where(steep, B**2 / np.where(steep, 4.0 * (B - A), 1.0), np.maximum(A, 0.0))
 
 

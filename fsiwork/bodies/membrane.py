@@ -44,7 +44,8 @@ class Membrane(Body):
     ----------
     phi : flat field at centres
     map : the backward map, or None
-    guess : φ of the last pass of an iteration; while it is set, the force is taken there
+    passes : 2 for ``iterated``, else 1
+    guess : `state` after the last pass of an iteration; while it is set, the force is taken there
 
     Raises
     ------
@@ -76,7 +77,7 @@ class Membrane(Body):
         form = ("normal-tangential" if drop else "divergence") if form == "auto" else form
         dirac = ("plain" if form == "normal-tangential" else "renormalised") if dirac == "auto" else dirac
         self._pull = Pull(grid, self._law, form, self.eps, dirac == "renormalised")
-        self.form, self.dirac, self.guess = form, dirac, None
+        self.form, self.dirac, self.passes = form, dirac, 2 if coupling == "iterated" else 1
         self._distance, self._stretch = phi0, float(stretch)
         self.phi = grid.field(transport.dtype)
         self.map = BackwardMap(grid, edges, transport) if carry == "map" else None
@@ -106,7 +107,7 @@ class Membrane(Body):
         if self.guess is None and self.coupling != "semi-implicit":
             self._pull.add(flow.force, self.phi, self._band_now())
             return
-        phi = self.predict(flow, dt) if self.guess is None else self.guess
+        phi = self.predict(flow, dt) if self.guess is None else self.guess["phi"]
         if self._other is None:
             self._other = Band(self.grid, self.eps, self.dirac == "renormalised")
         self._other.find(phi)
@@ -146,9 +147,9 @@ class Membrane(Body):
             q[:] = state[name]
         self._fresh = False
 
-    def fields(self) -> dict[str, tuple[tuple[int, ...] | None, np.ndarray]]:
-        """φ and the components of Y at centres, views without ghosts."""
-        return {name: (None, self.grid.inside(q)) for name, q in self._named().items()}
+    def fields(self) -> dict[str, np.ndarray]:
+        """φ and the components of Y, flat fields at centres."""
+        return self._named()
 
     def gauges(self, flow) -> dict[str, float]:
         """Volume ∫1 - H_ε(φ) (kept by the flow), length (2D) or area (3D), elastic energy, centroid, half-extents
@@ -214,7 +215,7 @@ class Membrane(Body):
 
     def _named(self) -> dict[str, np.ndarray]:
         Y = self.map.Y if self.map else ()
-        return {"phi": self.phi} | {f"map_{XYZ[a]}": q for a, q in enumerate(Y)}
+        return {"phi": self.phi} | {f"Y_{XYZ[a]}": q for a, q in enumerate(Y)}
 
     def _from_distance(self, x):
         self.grid.padded(self.phi)[...] = self._stretch * self._distance(*x)

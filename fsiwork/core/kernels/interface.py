@@ -62,7 +62,7 @@ def assemble(runs, inside, flags, start, n, interior):
 @point
 def modulus(A, B):
     """M of MEASURED-coupling 6: the largest of A s² + B s (1 - s) over 0 ≤ s ≤ 1, and never below zero."""
-    return max(A, 0.0) if B <= 2.0 * A else B * B / (4.0 * (B - A))
+    return max(A, 0.0) if B <= max(2.0 * A, 0.0) else B * B / (4.0 * (B - A))
 
 
 @loop
@@ -95,21 +95,30 @@ def survey(out, phi, runs, s, kind, numbers, given):
 
 
 @loop
-def inside_sums(out, phi, start, n, flags, row, weights, eps):
-    """out[r] = Σ χ, Σ w₀ χ, Σ w₁ χ along each row of the box, χ = 1 - H_ε(φ); ``row`` finds the row in ``flags``."""
+def inside_sums(out, phi, start, n, flags, row, moments, eps):
+    """out[r] = Σ χ, Σ w₀ χ, Σ w₁ χ along each row of the box, χ = 1 - H_ε(φ).
+
+    ``row`` finds the row in ``flags``; ``moments`` (4, n + 1) are w₀, w₁ and their sums over the cells before.
+    """
     for r in prange(start.size):
-        p, w0, w1 = phi[start[r] : start[r] + n], weights[0], weights[1]
-        total, one, two = 0.0, 0.0, 0.0
-        for m in range(flags.shape[1]):
-            first, last = max(m * BLOCK - 1, 0), min((m + 1) * BLOCK - 1, n)
-            if flags[row[r], m]:
+        p, f = phi[start[r] : start[r] + n], flags[row[r]]
+        total, one, two, m = 0.0, 0.0, 0.0, 0
+        while m < f.size:
+            first, near = max(m * BLOCK - 1, 0), f[m]
+            while m < f.size and f[m] == near:
+                m += 1
+            last = min(m * BLOCK - 1, n)
+            count = 0
+            if not near:
+                for i in range(first, last):
+                    count += p[i] < 0.0
+            if not near and count == last - first:
+                total, one = total + count, one + (moments[2, last] - moments[2, first])
+                two += moments[3, last] - moments[3, first]
+            elif near or count:
                 for i in range(first, last):
                     chi = ramp(-p[i] / eps)
-                    total, one, two = total + chi, one + w0[i] * chi, two + w1[i] * chi
-            else:
-                for i in range(first, last):
-                    chi = 1.0 if p[i] < 0.0 else 0.0
-                    total, one, two = total + chi, one + w0[i] * chi, two + w1[i] * chi
+                    total, one, two = total + chi, one + moments[0, i] * chi, two + moments[1, i] * chi
         out[r, 0], out[r, 1], out[r, 2] = total, one, two
 
 
