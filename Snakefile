@@ -7,6 +7,7 @@ snakemake fig_3_12 table_3_1     single artefacts           snakemake chapter_3 
 import os
 import sys
 from functools import partial
+from shlex import quote
 
 from snakemake.utils import min_version
 
@@ -14,7 +15,7 @@ from fsiwork.provenance import source_hash
 from fsiwork.targets import Plan
 
 min_version("9.18")
-os.environ["PATH"] = os.path.dirname(sys.executable) + os.pathsep + os.environ["PATH"]
+shell.prefix(f"PATH={quote(os.path.dirname(sys.executable))}:$PATH; ")  # the Python that runs this file
 
 SIZE = config.get("size", "coarse")
 PLAN = Plan(config.get("configs", "configs"), "results")

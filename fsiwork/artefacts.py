@@ -1,10 +1,8 @@
 """The verbs that make the book: study, join, measure, figure, table, score, manifest, verify, warm."""
 
-import functools
 import hashlib
 import json
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -22,29 +20,9 @@ CONFIGS, RESULTS = Path("configs"), Path("results")
 
 
 def register(app: typer.Typer) -> None:
-    """Add the verbs to the command."""
+    """Add the verbs to the command, which turns their `Faults` into one line each."""
     for verb in (study, join, measure, figure, table, score, manifest, verify, warm):
-        app.command(name=verb.__name__)(_one_line_faults(verb))
-
-
-def _one_line_faults(verb: Callable[..., None]) -> Callable[..., None]:
-    """Faults of configuration and missing files: one line each, exit code 2."""
-
-    @functools.wraps(verb)
-    def guarded(*args: Any, **options: Any) -> None:
-        try:
-            verb(*args, **options)
-        except Faults as error:
-            lines = error.faults
-        except (FileNotFoundError, LookupError) as error:
-            lines = [" ".join(str(error).split())]
-        else:
-            return
-        for line in lines:
-            print(line, file=sys.stderr)
-        raise typer.Exit(2)
-
-    return guarded
+        app.command()(verb)
 
 
 def study(
@@ -159,7 +137,7 @@ def verify(results: Results = RESULTS) -> None:
     """Compare results with the hashes written when they were made; exit code 1 when one differs or is missing."""
     manifests = sorted(results.glob("*/manifest.json"))
     if not manifests:
-        raise FileNotFoundError(f"{results}: no manifest; `snakemake` writes it at the end")
+        raise Faults(f"{results}: no manifest; `snakemake` writes it at the end")
     wrong, count = [], 0
     for file in manifests:
         for name, expected in json.loads(file.read_text(encoding="utf-8")).items():

@@ -12,7 +12,7 @@ import xarray as xr
 from fsiwork.checkpoint import replacing
 from fsiwork.provenance import cost_path
 from fsiwork.studies.sweep import load, resolve
-from fsiwork.targets import SIZES, Check, Entry, Plan
+from fsiwork.targets import SIZES, Check, Entry, Faults, Plan
 
 SIGN = {"near": "≈", "at_most": "≤", "at_least": "≥"}
 
@@ -54,7 +54,9 @@ def measure(plan: Plan, entry: Entry, size: str) -> dict[str, Any]:
 
 
 def measured_of(path: Path) -> dict[str, float]:
-    """The numbers that `measure` wrote, NaN for null."""
+    """The numbers that `measure` wrote, NaN for null. Raises `Faults` when it did not."""
+    if not path.is_file():
+        raise Faults(f"{path}: no such file; `snakemake {path}` makes it")
     numbers = json.loads(path.read_text(encoding="utf-8"))["measured"]
     return {name: math.nan if value is None else value for name, value in numbers.items()}
 

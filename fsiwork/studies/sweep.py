@@ -14,21 +14,21 @@ from fsiwork import joining, provenance, scene
 from fsiwork.checkpoint import replacing
 from fsiwork.dataset import open_run, open_study, write
 from fsiwork.simulate import frames
-from fsiwork.targets import Plan, Point, Study
+from fsiwork.targets import Faults, Plan, Point, Study
 
 WARM_CELLS = 32  # grid on which `warm` compiles
 
 
 def resolve(function: str, layer: str):
-    """The function ``module.name`` of fsiwork/LAYER, or ``package.module:name`` anywhere. Raises LookupError."""
+    """The function ``module.name`` of fsiwork/LAYER, or ``package.module:name`` anywhere. Raises `Faults`."""
     place, _, name = function.rpartition(":") if ":" in function else function.rpartition(".")
     module = place if ":" in function else f"fsiwork.{layer}.{place}"
     try:
         return getattr(import_module(module), name)
     except ModuleNotFoundError as error:
-        raise LookupError(f"{function}: no module {error.name}") from error
+        raise Faults(f"{function}: no module {error.name}") from error
     except AttributeError:
-        raise LookupError(f"{function}: {module} has no function {name}") from None
+        raise Faults(f"{function}: {module} has no function {name}") from None
 
 
 def compute(plan: Plan, study: Study, job: str, size: str) -> list[Path]:
@@ -149,11 +149,11 @@ def load(path: str | Path) -> xr.Dataset:
     The study's axes are dimensions with coordinates. Gauges have the further dimension ``row``, and the time of a row
     is the coordinate ``t_step`` over the axes and ``row``; rows that a run does not have are NaN. ``cpu_seconds``,
     ``n_steps`` and ``n_cells`` (cells along the longest side) stand beside, from the cost file. Fields stay on the
-    disk until they are used. Raises FileNotFoundError.
+    disk until they are used. Raises `Faults` when the file is missing.
     """
     path = Path(path)
     if not path.is_file():
-        raise FileNotFoundError(f"{path}: no such file; `snakemake` makes it")
+        raise Faults(f"{path}: no such file; `snakemake {path}` makes it")
     data = open_study(path)
     for values in data.variables.values():
         if "x_c" not in values.dims and "x_n" not in values.dims:
