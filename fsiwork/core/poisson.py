@@ -1,4 +1,4 @@
-"""Direct solvers with constant coefficients: cosine and sine transforms, and tridiagonal lines."""
+"""Direct solver with constant coefficients, cosine and sine transforms with elimination; door to the other two."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -9,41 +9,14 @@ import numpy as np
 import scipy.fft
 import scipy.fftpack
 
-from fsiwork.core.kernels.poisson import (
-    factorise,
-    lines_across,
-    lines_along,
-    singular_line,
-    sweep,
-    transpose,
-)
+from fsiwork.core.ends import END_ROWS, Ends, check_ends, is_singular
+from fsiwork.core.kernels.poisson import factorise, singular_line, sweep, transpose
+from fsiwork.core.lines import Lines
+from fsiwork.core.multigrid import NotConverged, Variable
 
-Ends = Sequence[tuple[str, str]]
-
-# (d, w): first row of a line with diagonal d + w σ, its right-hand side times w; inner rows are (2, 1)
-END_ROWS = {"neumann": (1.0, 1.0), "dirichlet": (3.0, 1.0), "node": (2.0, 1.0), "node-neumann": (1.0, 0.5)}
+__all__ = ["Direct", "Lines", "NotConverged", "Variable"]
 
 BLOCK = 1024  # columns of one sweep in 2D
-
-
-def check_ends(n: Sequence[int], ends: Ends) -> tuple[tuple[str, str], ...]:
-    """The ends as a tuple of pairs, or ValueError: unknown word, half a periodic axis, fewer than two unknowns."""
-    if len(ends) != len(n):
-        raise ValueError(f"{len(n)} axes need {len(n)} pairs of ends, got {len(ends)}")
-    for a, (pair, k) in enumerate(zip(ends, n, strict=True)):
-        unknown = [word for word in pair if word != "periodic" and word not in END_ROWS]
-        if len(pair) != 2 or unknown:
-            raise ValueError(f"axis {a}: ends {tuple(pair)} are not two of periodic, {', '.join(END_ROWS)}")
-        if (pair[0] == "periodic") != (pair[1] == "periodic"):
-            raise ValueError(f"axis {a}: both ends are periodic or none, got {tuple(pair)}")
-        if k < 2:
-            raise ValueError(f"axis {a}: at least 2 unknowns, got {k}")
-    return tuple((low, high) for low, high in ends)
-
-
-def is_singular(ends: Ends) -> bool:
-    """Whether a constant is a solution of the homogeneous problem."""
-    return all(word in ("periodic", "neumann", "node-neumann") for pair in ends for word in pair)
 
 
 @dataclass(frozen=True)
@@ -107,7 +80,7 @@ def _cost(pair: tuple[str, str], n: int) -> float:
 
 
 class Direct:
-    """(c0 − c1 ∇²) q = f with the second-order stencil, one line of the grid solved by elimination, the rest by transforms.
+    """(c0 − c1 ∇²) q = f with the second-order stencil: elimination along one axis, transforms along the others.
 
     Parameters
     ----------
@@ -140,7 +113,7 @@ class Direct:
         """The axis of the elimination: where the transforms of the others (and a turn of the array) cost least."""
         costs = [_cost(pair, k) for pair, k in zip(self.ends, self.n, strict=True)]
         dim = len(self.n)
-        rest = [sum(costs[:a] + costs[a + 1 :]) + 1.2 * (a == dim - 1 > 0) for a in range(dim)]
+        rest = [sum(costs[:a] + costs[a + 1 :]) + 2.4 * (a == dim - 1 > 0) for a in range(dim)]
         best = int(np.argmin(rest))
         if not np.isfinite(rest[best]):
             raise ValueError(f"only one axis may mix ends half a cell and a whole cell away, got {self.ends}")
@@ -230,68 +203,3 @@ class Direct:
         sweep(flat, self._factors, self._tail, self._counts, self._blocks, self._scales, self._stride, self._lines)
         if self._singular:
             constant[:] = mode
-
-
-class Lines:
-    """Π_a (1 − α ∂_aa) q = f, one tridiagonal solve a line: diffusion in increment form, with an error O(α²).
-
-    ``n``, ``h`` and ``ends`` as in `Direct`; every mixture of ends on every axis.
-    """
-
-    def __init__(self, n: Sequence[int], h: float, ends: Ends):
-        self.n = tuple(int(k) for k in n)
-        self.h = float(h)
-        self.ends = check_ends(self.n, ends)
-        self._key = None
-        self._blocks = [self._columns(a) for a in range(len(self.n) - 1)]
-
-    def _columns(self, a: int) -> np.ndarray:
-        run = int(np.prod(self.n[a + 1 :]))
-        first = np.arange(int(np.prod(self.n[:a]))) * run * self.n[a]
-        start = np.array([k + c for k in first for c in range(0, run, BLOCK)])
-        return np.stack([start, start, np.minimum(BLOCK, run - start % run)], axis=1)
-
-    def _coefficients(self, a: int, ratio: float, dtype) -> tuple[np.ndarray, int]:
-        """g, factors of f, and weights of the periodic sums for 1 − α ∂_aa, ratio = α/h²."""
-        n, sigma = self.n[a], 1 / ratio
-        r = np.exp(-2 * np.arcsinh(np.sqrt(sigma) / 2))
-        c = np.zeros((4, n))
-        c[1] = sigma
-        reach = 0
-        if self.ends[a][0] == "periodic":
-            reach = int(min(n, np.ceil(np.log(0.25 * np.finfo(dtype).eps) / np.log(r))))
-            power = r ** np.arange(n) / -np.expm1(n * np.log(r))
-            c[0], c[2], c[3] = r, sigma * power[::-1], r * power
-        else:
-            diagonal = np.full(n, 2 + sigma)
-            for i, word in ((0, self.ends[a][0]), (-1, self.ends[a][1])):
-                d, w = END_ROWS[word]
-                diagonal[i] = d + w * sigma
-                c[1, i] *= w
-            w = diagonal[0]
-            c[0, 0] = 1 / w
-            for i in range(1, n):
-                w = diagonal[i] - 1 / w
-                c[0, i] = 1 / w
-        return c.astype(dtype), reach
-
-    def solve(self, f: np.ndarray, alpha: float) -> np.ndarray:
-        """q in place of ``f`` (contiguous, shape ``n``, float32 or float64); ``alpha`` >= 0 [length²].
-
-        Coefficients are kept while alpha and the dtype stay the same. Raises ValueError for a wrong array or alpha.
-        """
-        if f.shape != self.n or not f.flags.c_contiguous or f.dtype.kind != "f":
-            raise ValueError(f"a contiguous real array of shape {self.n} is needed, got {f.dtype} {f.shape}")
-        if not alpha >= 0:
-            raise ValueError(f"alpha must not be negative, got {alpha}")
-        if alpha == 0:
-            return f
-        if (alpha, f.dtype) != self._key:
-            self._lines = [self._coefficients(a, alpha / self.h**2, f.dtype) for a in range(len(self.n))]
-            self._key = (alpha, f.dtype)
-        for a, blocks in enumerate(self._blocks):
-            c, reach = self._lines[a]
-            lines_across(f.reshape(-1), c, reach, blocks, int(np.prod(self.n[a + 1 :])))
-        c, reach = self._lines[-1]
-        lines_along(f.reshape(-1, self.n[-1]), c, reach)
-        return f

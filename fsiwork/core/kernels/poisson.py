@@ -1,9 +1,9 @@
-"""Tridiagonal sweeps of the direct solvers: along a slow axis by whole rows, along the contiguous axis eight rows at once.
+"""Tridiagonal sweeps of the direct solvers: by whole rows, or along the contiguous axis eight rows at once.
 
-Every line system is scaled to off-diagonals −1 and diagonal 2 + σ. With g = 1/w of the factorisation w_i = d_i − 1/w_{i−1}
-the solve is y_i = b_i + g_{i−1} y_{i−1}, then x_i = g_i (y_i + x_{i+1}): no division, one array of coefficients. A
-periodic line has the constant factor g = r, the small root of r + 1/r = 2 + σ, and the same two recurrences
-run round the circle; where they start is a sum over the few rows whose power of r is not yet round-off.
+Every line system is scaled to off-diagonals −1 and diagonal 2 + σ. With g = 1/w of the factorisation
+w_i = d_i − 1/w_{i−1} the solve is y_i = b_i + g_{i−1} y_{i−1}, then x_i = g_i (y_i + x_{i+1}): no division, one array
+of coefficients. A periodic line has the constant factor g = r, the small root of r + 1/r = 2 + σ, and the same two
+recurrences run round the circle; where they start is a sum over the few rows whose power of r is not yet round-off.
 """
 
 import numpy as np
@@ -50,9 +50,9 @@ def factorise(g, tail, counts, sigma, blocks, ends, s, n):
 def sweep(q, g, tail, counts, blocks, scales, s, n):
     """Solve the lines of every column of ``q`` in place, along rows ``s`` apart.
 
-    ``tail`` = (limit of g, 1/(1 − r^n), room for the sums) a column; ``counts[0]`` as in `factorise`, ``counts[1, b, i]``
-    the columns whose i-th power of r is not round-off (0 for open lines); ``scales`` = factors of the right-hand side
-    in the first, the inner and the last row.
+    ``tail`` = (limit of g, 1/(1 − r^n), room for the sums) a column; ``counts[0]`` as in `factorise`,
+    ``counts[1, b, i]`` the columns whose i-th power of r is not round-off (0 for open lines); ``scales`` = factors of
+    the right-hand side in the first, the inner and the last row.
     """
     for b in prange(blocks.shape[0]):
         start, column, width = blocks[b]
@@ -77,8 +77,9 @@ def sweep(q, g, tail, counts, blocks, scales, s, n):
             a = g[start + (i - 1) * s : start + (i - 1) * s + k]
             for j in range(k):
                 x[j] = c * x[j] + a[j] * y[j]
-            for j in range(k, width):
-                x[j] = c * x[j] + limit[j] * y[j]
+            v, z, a = x[k:], y[k:], limit[k:]
+            for j in range(v.size):
+                v[j] = c * v[j] + a[j] * z[j]
         seed[:] = 0
         for i in range(n - 1, -1, -1):
             y = q[start + i * s : start + i * s + width]
@@ -93,8 +94,9 @@ def sweep(q, g, tail, counts, blocks, scales, s, n):
             a = g[start + i * s : start + i * s + k]
             for j in range(k):
                 x[j] = a[j] * (x[j] + y[j])
-            for j in range(k, width):
-                x[j] = limit[j] * (x[j] + y[j])
+            v, z, a = x[k:], y[k:], limit[k:]
+            for j in range(v.size):
+                v[j] = a[j] * (v[j] + z[j])
             y = x
 
 
