@@ -190,5 +190,7 @@ class Store:
     def close(self, keep: bool) -> None:
         """Let go of the folder, and delete it unless ``keep`` and a state is in it."""
         if not (keep and self._states()):
+            for file in reversed(self._states()):  # first: without states nobody looks for the frames
+                file.unlink()
             shutil.rmtree(self.folder, ignore_errors=True)
         self._release()

@@ -5,6 +5,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,9 @@ BOOK = (
     "G.-H. Cottet, E. Maitre, T. Milcent: Level Set Methods for Fluid-Structure Interaction. "
     "Applied Mathematical Sciences 210, Springer, 2022"
 )
+
+
+sources = cache(provenance.source_hash)  # of the code that this process has loaded, not of later edits
 
 
 def write(
@@ -51,7 +55,7 @@ def write(
     fsiwork.checkpoint.DiskFull, fsiwork.checkpoint.Damaged, RuntimeError (another process writes the same run).
     """
     path = Path(path)
-    identity = {"scene": provenance.scene_id(layout.plain(scene)), "source": provenance.source_hash()}
+    identity = {"scene": provenance.scene_id(layout.plain(scene)), "source": sources()}
     store = Store(path, identity, resume)
     keep = True
     try:
