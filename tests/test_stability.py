@@ -1,12 +1,16 @@
 """The linear model of section 1.6 against itself in real space, (1.54), and the search for a largest step."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 
+from fsiwork import scene
 from fsiwork.studies import exact, linear, orders, stability
+
+SCENES = Path(__file__).parents[1] / "configs" / "scenes"
 
 
 def real_space_step(scheme, mu, lam, eps, dt, n):
@@ -18,6 +22,9 @@ def real_space_step(scheme, mu, lam, eps, dt, n):
     viscous, force = one - dt * mu * laplacian, -dt * lam / eps * laplacian
     if scheme == "explicit":
         new, old = [[viscous, zero], [dt * one, one]], [[one, force], [zero, one]]
+    elif scheme == "crank-nicolson":
+        half = 0.5 * dt * mu * laplacian
+        new, old = [[one - half, zero], [dt * one, one]], [[one + half, force], [zero, one]]
     elif scheme == "old-velocity":
         new, old = [[viscous, zero], [zero, one]], [[one, force], [-dt * one, one]]
     elif scheme == "implicit":
@@ -44,7 +51,7 @@ def test_modes_are_those_of_the_scheme_on_a_grid(scheme, ratio):
 
 
 def test_1_54_is_necessary_and_sufficient_in_936_cases():
-    scan = stability.linear_scan(None, {"cells": 16, "steps": 20000})
+    scan = stability.linear_scan(None, {"cells": 8, "steps": 20000})
     deviation, excess = scan["deviation"][1], scan["excess"][1]
     assert deviation.shape == excess.shape == (936,)
     assert np.abs(deviation).max() <= 1e-12
@@ -82,6 +89,18 @@ def test_old_velocity_is_stable_up_to_its_own_limit_only():
         dt = np.array([factor * limit])
         radius = linear.radius("old-velocity", *linear.numbers(case, dt, n)).max()
         assert bool(radius <= 1 + 1e-12) == stable
+
+
+def test_crank_nicolson_gains_nothing_from_viscosity():
+    width, n = 1.5, 16
+    dx = 2 * np.pi / n
+    for mu in (0.0, 0.03, 3.0):
+        case = tuple(np.array([q]) for q in (mu, 2.0, width))
+        for factor in (0.999, 1.001):
+            dt = np.array([factor * exact.step_limit(2.0, mu, width * dx, dx, theta=0.5)])
+            radius = linear.radius("crank-nicolson", *linear.numbers(case, dt, n)).max()
+            assert bool(radius <= 1 + 1e-12) == (factor < 1)
+    assert exact.step_limit(2.0, 3.0, 0.1, 0.01, theta=0.5) == exact.step_limit(2.0, 0.0, 0.1, 0.01)
 
 
 def test_one_point_of_a_study_says_what_the_scan_says():
@@ -131,11 +150,8 @@ def datasets(limits=(2.0, 1.5), found=(1, 1)):
     schemes = ["explicit", "implicit", "semi-implicit", "predictor-printed", "predictor-corrected"]
     ratios = [0.99, 1.01]
     radius = [[stability.spectral_radius(None, {"scheme": s, "ratio": r})["radius"] for r in ratios] for s in schemes]
-    drop = {
-        "limit": ("width", list(limits)),
-        "predicted_lambda": ("width", [1.0, 1.0]),
-        "found": ("width", list(found)),
-    }
+    drop = {"limit": ("width", list(limits)), "found": ("width", list(found))}
+    drop |= {"predicted_lambda": ("width", [1.0, 1.0]), "predicted_scheme": ("width", [0.5, 0.5])}
     return {
         "stability_spectral": xr.Dataset({"deviation": ("tension", [1e-14, -3e-14])}),
         "stability_stepping": xr.Dataset({"excess": ("tension", [1e-5, 4e-5])}),
@@ -154,10 +170,31 @@ def test_measures_of_the_artefact():
     assert max(measured["implicit_radius"], measured["semi_implicit_radius"], measured["corrected_radius"]) < 1
     assert measured["printed_radius"] > 1.1
     assert (measured["drop_ratio_min"], measured["drop_ratio_max"]) == (1.5, 2.0)
+    assert (measured["drop_scheme_ratio_min"], measured["drop_scheme_ratio_max"]) == (3.0, 4.0)
     # a case that is unstable at every step must not pass for a good one, one without a limit counts apart
     assert stability.measure_1_54(datasets((math.nan, 1.5), (-1, 1)))["drop_ratio_min"] == 0
     free = stability.measure_1_54(datasets((0.24, 1.5), (0, 1)))
     assert (free["drop_ratio_max"], free["drop_no_limit"]) == (1.5, 1)
+
+
+@pytest.mark.parametrize("name", ["oscillating_drop", "elliptic_membrane"])
+def test_largest_step_of_the_whole_solver(name):
+    overrides = {"box.cells": 32, "bodies.0.coupling": "explicit", "bodies.0.width.cells": 3, "fluid.viscosity": 0.01}
+    made = scene.load(SCENES / f"{name}.yaml", overrides)
+    answer = stability.largest_step(made, {"horizon": 0.5})
+    assert answer["found"] == 1
+    assert answer["n_cells"] == 32
+    body = made.bodies[0]
+    tension = 1.0 if name == "oscillating_drop" else body.stretch * 10 * (body.stretch - 1)
+    assert answer["predicted_tension"] == pytest.approx(exact.step_limit(tension, 0.01, 3 / 16, 1 / 16))
+    assert 1 < answer["limit"] / answer["predicted_scheme"] < 4
+    for factor, stable in ((0.95, True), (1.1, False)):
+        assert stability.stays_bounded(made, factor * answer["limit"], 0.5)[0] is stable
+
+
+def test_largest_step_wants_one_body_in_the_plane():
+    with pytest.raises(ValueError, match="in the plane"):
+        stability.largest_step(scene.load(SCENES / "two_drops.yaml"), {})
 
 
 def test_orders_of_a_made_up_refinement():

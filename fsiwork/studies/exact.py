@@ -141,15 +141,18 @@ def _dispersion(s, tension, modulus, radius, mu, rho, n):
     return rho * s**2 * (2 - b - d) + normal
 
 
-def step_limit(lam, mu, eps, dx, rho=1.0, *, directions: int = 2, peak: float = 1.0):
+def step_limit(lam, mu, eps, dx, rho=1.0, *, directions: int = 2, peak: float = 1.0, theta: float = 1.0):
     """Largest stable Δt of the explicit scheme (1.53): (1.54), [με + √(μ²ε² + ½ρλεΔx²)]/λ.
 
     ``directions`` is the dimension of the interface: 2 gives (1.54), 1 replaces ½ by 1 (a flow in the plane).
     ``peak`` is ζ(0): 1 for the coefficient λ/ε of (1.53), ½ for the λ/(2ε) of (1.48). Both necessary and sufficient on
     grids with an even number of points (ERRATA 3). For a membrane λ is the tension s E'(s). Arrays broadcast.
+
+    ``theta`` weighs the new time in the diffusion, θ ≥ ½: μ becomes (2θ-1)μ (from r = -1 in the quadratic of one mode),
+    so that Crank–Nicolson, θ = ½, gains nothing from viscosity; backward Euler is the θ = 1 of (1.53).
     """
     width = np.asarray(eps) / peak
-    viscous = mu * width
+    viscous = (2 * theta - 1) * mu * width
     return (viscous + np.sqrt(viscous**2 + rho * lam * width * np.asarray(dx) ** 2 / directions)) / lam
 
 

@@ -13,7 +13,15 @@ from numba import prange
 from fsiwork.core.kernels import loop
 from fsiwork.studies.exact import step_limit
 
-SCHEMES = ("explicit", "old-velocity", "implicit", "semi-implicit", "predictor-corrected", "predictor-printed")
+SCHEMES = (
+    "explicit",
+    "crank-nicolson",
+    "old-velocity",
+    "implicit",
+    "semi-implicit",
+    "predictor-corrected",
+    "predictor-printed",
+)
 ROUNDING = 1e-13  # a spectral radius this much above 1 is round-off; it moves a limit by half as much
 CASES = tuple(product((0.0, *10.0 ** np.arange(-8, 4)), 10.0 ** np.arange(-3, 9), (0.5, 1.0, 1.5, 3.0, 6.0, 10.0)))
 """936 cases (μ, λ, ε/Δx): μ 0 and 1e-8…1e3, λ 1e-3…1e8, ε/Δx 0.5…10."""
@@ -31,11 +39,13 @@ def radius(scheme: str, g, d, dt=0.0) -> np.ndarray:
     """Spectral radius of one step for modes with numbers g and d (arrays); ``dt`` for the misprint alone.
 
     Eigenvalues are the roots of a r² - b r + c; the discriminants are written without the cancellation of b² - 4ac.
-    Schemes: (1.53); (1.53) with uⁿ in the equation of φ; (1.59); (1.60)-(1.62) with Δt λ/ε (two names); (1.60) as
-    printed, with Δt² λ/ε.
+    Schemes: (1.53); the same with half of the diffusion at the old time, or with uⁿ in the equation of φ; (1.59);
+    (1.60)-(1.62) with Δt λ/ε (two names); the same with Δt² λ/ε, as printed.
     """
     if scheme == "explicit":
         a, b, c, disc = 1 + d, 2 + d - g, 1.0, d * d + g * (g - 4 - 2 * d)
+    elif scheme == "crank-nicolson":
+        a, b, c, disc = 1 + 0.5 * d, 2 - g, 1 - 0.5 * d, g * (g - 4) + d * d
     elif scheme == "old-velocity":
         a, b, c, disc = 1 + d, 2 + d, 1 + g, d * d - 4 * (1 + d) * g
     elif scheme == "implicit":
