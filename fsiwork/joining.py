@@ -29,9 +29,7 @@ def axis_names(paths: Sequence[str]) -> dict[str, str]:
         free = [
             tail
             for k, tail in enumerate(tails, 1)
-            if tail not in VARIABLES
-            and tail[0].isalpha()
-            and not any(o.endswith("." + ".".join(words[-k:])) for o in others)
+            if tail not in VARIABLES and tail[0].isalpha() and not any(o.endswith(_tail(words, k)) for o in others)
         ]
         names[path] = free[0] if free else tails[-1]
     return names
@@ -66,6 +64,10 @@ class Plan:
     def index(self, k: int) -> tuple[int, ...]:
         """Where point ``k`` stands along the dials."""
         return tuple(self.values[path].index(_key(self.points[k][path])) for path in self.dims)
+
+    def name(self, variable: str) -> str:
+        """Name in the study: a variable called like a dimension, because it differs from run to run, gives way."""
+        return f"{variable}_of_run" if variable in self.sizes or variable in self.dims.values() else variable
 
     def grow(self, sizes: Mapping[str, int]) -> None:
         """A dimension is as long as the longest of the points needs it."""
@@ -179,11 +181,9 @@ def _declare(writer: Writer, plan: Plan, fixed: dict[str, np.ndarray]) -> None:
             writer.variable(name, shape.dims, shape.dtype, shape.attributes)
             writer.put(name, fixed.get(name, 0))
             continue
-        # a coordinate that differs from run to run may not keep the name of its dimension
-        target = f"{name}_of_run" if shape.dims == (name,) else name
         whole = len(dials) + (shape.dims[:1] == ("t",) and len(shape.dims) > 1)
         dtype = np.dtype("f8") if shape.dtype is str or shape.dtype.kind != "f" else shape.dtype
-        writer.variable(target, (*dials, *shape.dims), dtype, shape.attributes, whole=whole, fill=np.nan)
+        writer.variable(plan.name(name), (*dials, *shape.dims), dtype, shape.attributes, whole=whole, fill=np.nan)
 
 
 def _words(writer: Writer, plan: Plan, words: Mapping[str, list[str]]) -> None:
@@ -201,13 +201,12 @@ def _copy(writer: Writer, plan: Plan, fixed: dict, path: Path, index: tuple[int,
         for name, shape in plan.variables.items():
             if name in fixed or name == "grid" or name not in run.variables:
                 continue
-            target = f"{name}_of_run" if shape.dims == (name,) else name
             extent = tuple(slice(0, n) for n in run[name].shape)
             if shape.dims[0] == "t" and len(shape.dims) > 1:
                 for k in range(run[name].shape[0]):
-                    writer.put(target, run[name][k], (*index, k, *extent[1:]))
+                    writer.put(plan.name(name), run[name][k], (*index, k, *extent[1:]))
             else:
-                writer.put(target, run[name][:], (*index, *extent))
+                writer.put(plan.name(name), run[name][:], (*index, *extent))
 
 
 def tabulate(
@@ -239,4 +238,4 @@ def tabulate(
         for k, result in enumerate(results):
             for name in plan.variables.keys() & result.keys():
                 values = np.asarray(result[name], dtype=float)
-                writer.put(name, values, (*plan.index(k), *(slice(0, n) for n in values.shape)))
+                writer.put(plan.name(name), values, (*plan.index(k), *(slice(0, n) for n in values.shape)))

@@ -67,10 +67,9 @@ def test_divergence_from_the_file_alone(any_scene, tmp_path):
 def test_values_dimensions_and_words(run):
     small, path = run
     with dataset.open_run(path) as ds:
-        assert (
-            ds.u.dims == ("t", "y_c", "x_n") and ds.v.dims == ("t", "y_n", "x_c") and ds.p.dims == ("t", "y_c", "x_c")
-        )
-        for name, (_, q) in fields(scene, 1.0).items():
+        assert ds.u.dims == ("t", "y_c", "x_n") and ds.v.dims == ("t", "y_n", "x_c")
+        assert ds.p.dims == ("t", "y_c", "x_c")
+        for name, (_, q) in fields(small, 1.0).items():
             assert np.array_equal(ds[name].isel(t=0).values, q.T)
         assert np.allclose(ds.t, 0.2 * np.arange(7)) and np.allclose(ds.t_step, 0.05 * np.arange(1, 25))
         assert ds.volume.dims == ("t_step",) and ds.x_n[0] == 0.5 and ds.x_n[-1] == 2.5
@@ -271,6 +270,14 @@ def test_results_of_a_function_become_a_study(tmp_path):
         assert study.limit.values[:2].tolist() == [0.5, 0.25] and np.isnan(study.limit[2])
         assert study.curve.dims == ("cells", "curve_i") and np.isnan(study.curve[1, 2]) and study.curve[0, 2] == 3.0
         assert study.why.values.tolist() == ["found", "", ""]
+
+
+def test_a_dial_may_have_the_name_of_a_gauge(tmp_path):
+    paths, _ = sweep(tmp_path)
+    dataset.join(paths[:2], [{"volume": 1.0}, {"volume": 2.0}], tmp_path / "s.nc", keep=["volume", "dt"])
+    with dataset.open_study(tmp_path / "s.nc") as study, dataset.open_run(paths[1]) as run:
+        assert list(study.volume.values) == [1.0, 2.0]
+        assert np.array_equal(study.volume_of_run.sel(volume=2.0), run.volume)
 
 
 def test_names_of_dials():
