@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from fsiwork.bodies import laws
 from fsiwork.bodies.body import Body
 from fsiwork.bodies.membrane import Membrane
 from fsiwork.core import shapes
@@ -22,11 +23,64 @@ def parts(scene: Scene) -> tuple[Flow, tuple[Body, ...]]:
     return flow, tuple(BODIES[spec.kind](spec, grid, edges) for spec in scene.bodies)
 
 
+def passes(scene: Scene) -> int:
+    """How often a step is taken: twice where a body iterates its coupling."""
+    return 2 if any(getattr(spec, "coupling", "") == "iterated" for spec in scene.bodies) else 1
+
+
 def _membrane(spec, grid: Grid, edges: Edges) -> Membrane:
-    raise NotImplementedError
+    carried = spec.transport
+    return Membrane(
+        grid,
+        edges,
+        shape(spec.shape).distance,
+        _law(spec.energy),
+        spec.width.of(grid.h),
+        transport=Transport(grid, edges, carried.scheme, carried.tableau, np.dtype(carried.dtype)),
+        stretch=spec.stretch,
+        form=spec.form,
+        dirac=spec.dirac,
+        coupling=spec.coupling,
+        carry=carried.carry,
+        inside=None if spec.inside is None else (spec.inside.density, spec.inside.viscosity),
+        surface_mass=spec.surface_mass,
+    )
+
+
+def _law(spec) -> laws.Law:
+    kind = getattr(spec, "kind", None)  # a law written in Python is the object itself
+    return LAWS[kind](spec.stiffness) if kind in LAWS else spec
 
 
 BODIES = {"membrane": _membrane}
+LAWS = {"quadratic": laws.Quadratic, "linear": laws.Linear}
+SHAPES = {
+    "ball": shapes.Ball,
+    "disc": shapes.Ball,
+    "ellipsoid": shapes.Ellipsoid,
+    "ellipse": shapes.Ellipsoid,
+    "box": shapes.Box,
+    "polygon": shapes.Polygon,
+    "capsule": shapes.Capsule,
+    "torus": shapes.Torus,
+    "cassini": shapes.Cassini,
+    "slot": shapes.Slot,
+    "union": shapes.Union,
+    "intersection": shapes.Intersection,
+    "minus": shapes.Minus,
+    "moved": shapes.Moved,
+}
+
+
+def shape(spec) -> shapes.Shape:
+    """The signed distance that a shape's spec describes."""
+    values = {name: getattr(spec, name) for name in type(spec).model_fields if name != "kind"}
+    for name, value in values.items():
+        if name in ("shape", "cut"):
+            values[name] = shape(value)
+        elif name == "parts":
+            values[name] = tuple(shape(part) for part in value)
+    return SHAPES[spec.kind](**values)
 
 
 def _side(spec) -> Side:

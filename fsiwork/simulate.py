@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fsiwork.bodies.body import Body
-from fsiwork.build import parts
+from fsiwork.build import parts, passes
 from fsiwork.core import energy
 from fsiwork.core.flow import Flow
 from fsiwork.core.grid import Grid
@@ -33,17 +33,17 @@ def step(flow: Flow, bodies: tuple[Body, ...], dt: float) -> None:
         body.move(flow, dt)  # φ or Y carried by the new velocity         (3.64)
 
 
-def iterate(flow: Flow, bodies: tuple[Body, ...], dt: float) -> None:
-    """One step in several passes: forces and stabiliser of a pass act on the difference to the pass before."""
+def iterate(flow: Flow, bodies: tuple[Body, ...], dt: float, times: int) -> None:
+    """One step in several passes: forces at the last pass's interface, stabiliser on the difference to its velocity."""
     before = flow.state(), [body.state() for body in bodies]
-    for sweep in range(max(body.passes for body in bodies)):
+    for sweep in range(times):
         if sweep:
             flow.guess = [q.copy() for q in flow.u]
             guesses = [body.state() for body in bodies]
             flow.restore(before[0])
             for body, state, guess in zip(bodies, before[1], guesses, strict=True):
                 body.restore(state)
-                body.guess = guess
+                body.guess = guess["phi"]
         step(flow, bodies, dt)
     flow.guess = None
     for body in bodies:
@@ -83,7 +83,7 @@ class Simulation:
     """A scene in motion: flow, bodies and clock."""
 
     def __init__(self, scene: Scene, flow: Flow, bodies: tuple[Body, ...]):
-        self.scene, self.flow, self.bodies = scene, flow, bodies
+        self.scene, self.flow, self.bodies, self.passes = scene, flow, bodies, passes(scene)
         clock = scene.clock
         self.automatic = clock.step == "auto"
         self.total = 0 if self.automatic else max(1, math.ceil(clock.end / clock.step - 1e-9))
@@ -106,8 +106,8 @@ class Simulation:
             longest = self.scene.clock.safety * min(self.limits.values())
             self.dt = left / max(1, math.ceil(left / longest - 1e-9)) if longest > 0.0 else left
         try:
-            if any(body.passes > 1 for body in self.bodies):
-                iterate(self.flow, self.bodies, self.dt)
+            if self.passes > 1:
+                iterate(self.flow, self.bodies, self.dt, self.passes)
             else:
                 step(self.flow, self.bodies, self.dt)
         except NotConverged as error:
@@ -265,12 +265,15 @@ def vorticity(flow: Flow) -> np.ndarray:
     return g.inside(0.25 * (corners + np.roll(corners, -1, 1))).copy()
 
 
-def _of_bodies(name: str, answers: list[dict[str, np.ndarray]], grid: Grid) -> dict[str, tuple[None, np.ndarray]]:
-    """A field of the bodies; with several bodies their index is the first axis."""
-    names = [k for k in (answers[0] if answers else ()) if k == name or (name == "Y" and k.startswith("Y_"))]
-    if len(answers) == 1:
-        return {k: (None, grid.inside(answers[0][k]).copy()) for k in names}
-    return {k: (None, np.stack([grid.inside(answer[k]) for answer in answers])) for k in names}
+def _of_bodies(name: str, answers: list[dict], grid: Grid) -> dict[str | tuple[str, int], tuple[None, np.ndarray]]:
+    """Copies of a field of the bodies (Y with its components), keyed with the body's number when there are several."""
+    found = {}
+    for number, answer in enumerate(answers):
+        for key, q in answer.items():
+            if key == name or (name == "Y" and key.startswith("map_")):
+                label = key.replace("map_", "Y_")
+                found[label if len(answers) == 1 else (label, number)] = None, grid.inside(q).copy()
+    return found
 
 
 def _part(state: dict[str, np.ndarray], prefix: str) -> dict[str, np.ndarray]:
