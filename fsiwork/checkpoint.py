@@ -43,17 +43,18 @@ def need_space(path: Path, need: float) -> None:
 
 
 @contextmanager
-def replacing(path: Path, need: float = 0.0) -> Iterator[Path]:
+def replacing(path: Path, need: float = 0.0, durable: bool = True) -> Iterator[Path]:
     """Give a temporary name in the folder of ``path``; move it there when the block succeeds, delete it otherwise.
 
-    The file is on the disk before it gets its name. Raises `DiskFull` before and when space runs out.
+    A ``durable`` file is on the disk before it gets its name, whatever happens to the power.
+    Raises `DiskFull` before and when space runs out.
     """
     need_space(path, need)
     spare = path.with_name(f"{path.name}.tmp.{os.getpid()}")
     try:
         yield spare
-        with open(spare, "rb+") as file:
-            os.fsync(file.fileno())
+        if durable:
+            _settle(spare)
         os.replace(spare, path)
     except (OSError, RuntimeError) as error:
         written = spare.stat().st_size if spare.exists() else 0
@@ -67,15 +68,18 @@ def replacing(path: Path, need: float = 0.0) -> Iterator[Path]:
         spare.unlink(missing_ok=True)
 
 
-def save_state(path: Path, state: Arrays, meta: dict[str, Any]) -> None:
+def _settle(path: Path) -> None:
+    with open(path, "rb+") as file:
+        os.fsync(file.fileno())
+
+
+def save_state(path: Path, state: Arrays, meta: dict[str, Any], durable: bool = True) -> None:
     """Write arrays, bit for bit, and a few words about them (JSON); the file is whole or absent."""
     arrays = {key: np.asarray(value) for key, value in state.items()}
     header = json.dumps({"meta": meta, "arrays": list(arrays)})
     words = np.frombuffer(header.encode(), np.uint8)
-    with (
-        replacing(Path(path), sum(value.nbytes for value in arrays.values()) + 4096.0) as spare,
-        open(spare, "wb") as file,
-    ):
+    size = sum(value.nbytes for value in arrays.values()) + 4096.0
+    with replacing(Path(path), size, durable) as spare, open(spare, "wb") as file:
         np.savez(file, header=words, **{f"array:{key}": value for key, value in arrays.items()})
 
 
@@ -131,6 +135,7 @@ class Store:
             raise
         self.count = self.meta.get("frames", 0)
         self.last_step = self.meta.get("last_step", -1)
+        self._settled = self.count
         for file in self.folder.glob("[0-9]*.npz"):
             if int(file.stem) >= self.count:
                 file.unlink()
@@ -172,6 +177,9 @@ class Store:
 
     def keep_state(self, state: Arrays, step: int, meta: dict[str, Any]) -> None:
         """Write a state of the run after ``step``; the one before the last is deleted."""
+        while self._settled < self.count:  # a state must find its frames
+            _settle(self.folder / f"{self._settled:06d}.npz")
+            self._settled += 1
         words = {"identity": self.identity, "frames": self.count, "last_step": self.last_step, **meta}
         save_state(self.folder / f"state-{step:012d}.npz", state, words)
         for file in self._states()[:-2]:
@@ -179,7 +187,7 @@ class Store:
 
     def add(self, arrays: Arrays, step: int, meta: dict[str, Any]) -> None:
         """Store the next frame."""
-        save_state(self.folder / f"{self.count:06d}.npz", arrays, meta)
+        save_state(self.folder / f"{self.count:06d}.npz", arrays, meta, durable=False)
         self.count += 1
         self.last_step = step
 
