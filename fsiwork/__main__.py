@@ -211,13 +211,16 @@ class _Log:
             self.last = now
 
 
+INTERRUPTED = 130
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; returns the exit code: 0, 1 (the machine refuses), 2 (the input is wrong), 130 (interrupted)."""
     code, lines = 0, []
     try:
         code = app(arguments, prog_name="fsiwork", standalone_mode=False)
     except KeyboardInterrupt:
-        code, lines = 130, ["interrupted"]
+        code = INTERRUPTED
     except MemoryError:
         code, lines = 1, ["out of memory"]
     except BrokenPipeError:
@@ -234,6 +237,8 @@ def main(arguments: list[str] | None = None) -> int:
             code = error.exit_code
         else:
             raise
+    if code == INTERRUPTED:  # typer turns the interrupt into this code without a word
+        lines = ["interrupted"]
     for line in lines:
         print(line, file=sys.stderr)
     return code if isinstance(code, int) else 0
