@@ -108,10 +108,11 @@ class Transport:
         if not self.weighted:
             return
         self._steepest(self._top, q, *self.grid.rows(), self._strides)
-        # Both by the root of the floor: powers of the indicators then stay in the middle of the range.
-        scale = float(self._top.max()) ** 2 * np.sqrt(self.floor)
+        # The kernel has 12 S. Both by the root of the floor: powers of S then stay in the middle of the range.
+        floor = np.sqrt(12 * self.floor)
+        scale = float(self._top.max()) ** 2 * floor
         if np.finfo(self.dtype).tiny < scale < np.inf:
-            self._k[3:] = 1 / scale, np.sqrt(self.floor)
+            self._k[3:] = 1 / scale, floor
 
     def _substep(self, q: np.ndarray, u, dt: float, rule: str) -> None:
         now, (start, n) = q, self.grid.rows()

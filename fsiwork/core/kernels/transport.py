@@ -3,25 +3,28 @@
 A stage writes ``out = a base + b (q - dt u·∇q)`` on the rows. ``out`` must share no memory with ``base`` or
 ``q`` (the loop would fall back to scalar code). The velocity is on the low faces and is averaged to the
 centres here; ``q`` needs three ghosts. ``s`` holds the strides of all axes but the last, whose stride is 1;
-``k = (a, b, b dt/2h, r2, e)`` with ``r2`` and ``e`` the scale and the floor of the smoothness indicators
+``k = (a, b, b dt/2h, r2, e)`` with ``r2`` and ``e`` the scale and the floor of the smoothness indicators 12 S
 (only their ratio matters), all of the dtype of ``q``.
 """
 
 import numpy as np
 from numba import njit, prange
 
-from fsiwork.core.kernels import FASTMATH, loop, point
+from fsiwork.core.kernels import FASTMATH, loop
 
 UPWIND1, UPWIND5, WENO5, WENO_Z = range(4)
 
-# Whole numbers of the formulas in single precision, so that they promote neither a float32 nor a float64.
+# Whole numbers (only: 1/3 would be rounded) in single precision, so that float32 fields stay float32.
 TWO, THREE, SIX, TEN, THIRTEEN = (np.float32(c) for c in (2, 3, 6, 10, 13))
+
+# Numba itself must inline these: LLVM leaves the longest formula a call, and a loop with a call has no SIMD.
+inline = njit(error_model="numpy", fastmath=FASTMATH, inline="always")
 
 # A maximum vectorises only when NaN may be ignored: allowed here, the field itself still carries its NaN.
 peak = njit(parallel=True, error_model="numpy", fastmath=FASTMATH | {"nnan"}, cache=True)
 
 
-@point
+@inline
 def difference(scheme, m3, m2, m1, o, p1, p2, r2, e):
     """h ∂q at ``o`` from three points upstream (m) and two downstream (p).
 
@@ -46,9 +49,9 @@ def difference(scheme, m3, m2, m1, o, p1, p2, r2, e):
     f1 = c2 + c2 + e1
     f2 = c2 + c3
     f3 = c3 + c3 - e3
-    s1 = r2 * (e1 * e1 * (THIRTEEN / THREE) + f1 * f1) + e
-    s2 = r2 * (e2 * e2 * (THIRTEEN / THREE) + f2 * f2) + e
-    s3 = r2 * (e3 * e3 * (THIRTEEN / THREE) + f3 * f3) + e
+    s1 = r2 * (THIRTEEN * e1 * e1 + THREE * f1 * f1) + e
+    s2 = r2 * (THIRTEEN * e2 * e2 + THREE * f2 * f2) + e
+    s3 = r2 * (THIRTEEN * e3 * e3 + THREE * f3 * f3) + e
     a1 = s1 * s1
     a2 = s2 * s2
     a3 = s3 * s3
@@ -64,7 +67,7 @@ def difference(scheme, m3, m2, m1, o, p1, p2, r2, e):
     return middle + (TWO * w1 * left + w3 * right) / (SIX * (w1 + w2 + w3))
 
 
-@point
+@inline
 def along(scheme, u, m3, m2, m1, o, p1, p2, p3, r2, e):
     """h u ∂q of one axis; where the velocity is negative the mirrored stencil, whose sign is |u|/u.
 
@@ -85,7 +88,7 @@ def along(scheme, u, m3, m2, m1, o, p1, p2, p3, r2, e):
     return abs(u) * d
 
 
-@point
+@inline
 def row2(scheme, out, base, q, u, v, I, n, s, k):
     x = s[0]
     a, b, c, r2, e = k[0], k[1], k[2], k[3], k[4]
@@ -101,7 +104,7 @@ def row2(scheme, out, base, q, u, v, I, n, s, k):
         o[i] = a * z[i] + b * p0[i] - c * g
 
 
-@point
+@inline
 def row3(scheme, out, base, q, u, v, w, I, n, s, k):
     x, y = s[0], s[1]
     a, b, c, r2, e = k[0], k[1], k[2], k[3], k[4]
