@@ -19,6 +19,8 @@ from fake_run import Frame, fields, frames, scene
 from fsiwork import dataset, layout
 from fsiwork.export import export
 
+pytestmark = pytest.mark.filterwarnings("ignore:The ioos_sos checker:DeprecationWarning")
+
 KNOWN = ["grid_topology is not a valid cf_role value. It must be one of timeseries_id, profile_id, trajectory_id"]
 BOXES = {
     "walls": {},
