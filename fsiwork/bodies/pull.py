@@ -44,17 +44,16 @@ class Pull:
         return np.array([*(self.grid.strides[a] for a in axes), 0][:3])
 
     def divergence(self, force: list[np.ndarray], phi: np.ndarray, band: Band) -> None:
-        """F_a += Σ_b ∂_b T_ab with T_aa at centres and T_ab at corners."""
-        law, runs, k = self.law, band.runs, 1.0 / self.grid.h
-        law.centres(phi, runs, band.cells, self._straight)
+        """F_a += Σ_b ∂_b T_ab with T at nodes."""
+        law, runs, h = self.law, band.runs, self.grid.h
+        law.nodes(phi, runs, band.cells, self._straight)
         for a, s in enumerate(self._first):
-            kernels.stress_at_centres(self._T, phi, runs, s, law.kind, self.numbers, law.given[1])
-            kernels.add_difference(force[a], self._T, runs, 0, -s[0], k)
+            kernels.stress_at_nodes(self._T, phi, runs, s, False, law.kind, self.numbers, law.given[1])
+            kernels.add_normal(force[a], self._T, runs, s, h)
         for a, b, s in self._pairs:
-            law.corners(phi, runs, band.cells, s)
-            kernels.stress_at_corners(self._T, phi, runs, s, law.kind, self.numbers, law.given[1])
-            kernels.add_difference(force[a], self._T, runs, s[1], 0, k)
-            kernels.add_difference(force[b], self._T, runs, s[0], 0, k)
+            kernels.stress_at_nodes(self._T, phi, runs, s, True, law.kind, self.numbers, law.given[1])
+            kernels.add_shear(force[a], self._T, runs, s[1], s[2], h)
+            kernels.add_shear(force[b], self._T, runs, s[0], s[2], h)
         kernels.clear(self._T, runs)
 
     def normal_tangential(self, force: list[np.ndarray], phi: np.ndarray, band: Band) -> None:

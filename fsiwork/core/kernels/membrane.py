@@ -8,11 +8,14 @@ Scratch fields are zero outside the runs.
 """
 
 import numpy as np
-from numba import prange
+from numba import njit, prange
 
-from fsiwork.core.kernels import loop, point
+from fsiwork.core.kernels import FASTMATH, point
 
 TINY = 1e-60  # added to |∇φ|²: a vanishing gradient stays finite and gives no force
+
+# Sums in the order written: SIMD bodies and remainders of loops, hence rows of any length, then round alike.
+loop = njit(parallel=True, error_model="numpy", fastmath=FASTMATH - {"reassoc"}, cache=True)
 
 
 @point
@@ -76,67 +79,68 @@ def stretch_at_centres(out, phi, runs, s, h):
 
 
 @loop
-def stretch_at_corners(out, phi, runs, s, h):
-    """Packed |∇φ| at the low corners (edges in 3D) of the directions of s[0] and s[1]."""
-    a, b, c, k = s[0], s[1], s[2], 0.5 / h
+def stretch_at_nodes(out, phi, runs, s, h):
+    """Packed |∇φ| at nodes (low corners in every direction), by differences of the points around."""
+    a, b, c, k = s[0], s[1], s[2], 0.25 / h
     for r in prange(runs.shape[0]):
         I, n, o = runs[r, 0], runs[r, 1], runs[r, 2]
         q, p, pa, pb, pab = out[o : o + n], phi[I:], phi[I - a :], phi[I - b :], phi[I - a - b :]
-        e, ea, eb, eab = phi[I + c :], phi[I + c - a :], phi[I + c - b :], phi[I + c - a - b :]
         w, wa, wb, wab = phi[I - c :], phi[I - c - a :], phi[I - c - b :], phi[I - c - a - b :]
         for i in range(n):
-            ga = k * ((p[i] - pa[i]) + (pb[i] - pab[i]))
-            gb = k * ((p[i] - pb[i]) + (pa[i] - pab[i]))
-            gc = 0.25 * k * ((e[i] - w[i]) + (ea[i] - wa[i]) + (eb[i] - wb[i]) + (eab[i] - wab[i]))
+            p0, p1, p2, p3, w0, w1, w2, w3 = p[i], pa[i], pb[i], pab[i], w[i], wa[i], wb[i], wab[i]
+            ga = k * (((p0 - p1) + (p2 - p3)) + ((w0 - w1) + (w2 - w3)))
+            gb = k * (((p0 - p2) + (p1 - p3)) + ((w0 - w2) + (w1 - w3)))
+            gc = k * (((p0 - w0) + (p1 - w1)) + ((p2 - w2) + (p3 - w3)))
             q[i] = np.sqrt(ga * ga + gb * gb + gc * gc + TINY)
 
 
 @loop
-def stress_at_centres(out, phi, runs, s, kind, numbers, given):
-    """T_aa = E'(|∇φ|) |∇φ| (1 - n_a²) D_ε at centres; a is the direction of s[0]."""
+def stress_at_nodes(out, phi, runs, s, shear, kind, numbers, given):
+    """T = E'(|∇φ|) |∇φ| (I - nn) D_ε at nodes: T_ab if ``shear``, else T_aa, for the directions of s[0] and s[1].
+
+    All of T at the same points, by compact differences: a saw-tooth in φ is resisted, while with T_aa at centres
+    from central differences (which do not see it) the membrane's energy grows.
+    """
     a, b, c = s[0], s[1], s[2]
     h, eps, renormalised, lam = numbers[0], numbers[1], numbers[2] > 0.0, numbers[3]
-    k = 0.5 / h
-    for r in prange(runs.shape[0]):
-        I, n, o = runs[r, 0], runs[r, 1], runs[r, 2]
-        T, p, e1 = out[I : I + n], phi[I:], given[o:]
-        ae, aw, be, bw, ce, cw = phi[I + a :], phi[I - a :], phi[I + b :], phi[I - b :], phi[I + c :], phi[I - c :]
-        for i in range(n):
-            ga, gb, gc = k * (ae[i] - aw[i]), k * (be[i] - bw[i]), k * (ce[i] - cw[i])
-            across = gb * gb + gc * gc
-            g = np.sqrt(ga * ga + across + TINY)
-            T[i] = tension(kind, lam, g, e1[i] if kind == 2 else 0.0) * across / g * dirac(p[i], g, eps, renormalised)
-
-
-@loop
-def stress_at_corners(out, phi, runs, s, kind, numbers, given):
-    """T_ab = -E'(|∇φ|) |∇φ| n_a n_b D_ε at the low corners (edges in 3D) of the directions of s[0] and s[1]."""
-    a, b, c = s[0], s[1], s[2]
-    h, eps, renormalised, lam = numbers[0], numbers[1], numbers[2] > 0.0, numbers[3]
-    k = 0.5 / h
+    k = 0.25 / h
     for r in prange(runs.shape[0]):
         I, n, o = runs[r, 0], runs[r, 1], runs[r, 2]
         T, p, pa, pb, pab, e1 = out[I : I + n], phi[I:], phi[I - a :], phi[I - b :], phi[I - a - b :], given[o:]
-        e, ea, eb, eab = phi[I + c :], phi[I + c - a :], phi[I + c - b :], phi[I + c - a - b :]
         w, wa, wb, wab = phi[I - c :], phi[I - c - a :], phi[I - c - b :], phi[I - c - a - b :]
         for i in range(n):
-            ga = k * ((p[i] - pa[i]) + (pb[i] - pab[i]))
-            gb = k * ((p[i] - pb[i]) + (pa[i] - pab[i]))
-            gc = 0.25 * k * ((e[i] - w[i]) + (ea[i] - wa[i]) + (eb[i] - wb[i]) + (eab[i] - wab[i]))
-            g = np.sqrt(ga * ga + gb * gb + gc * gc + TINY)
-            mean = 0.25 * ((p[i] + pab[i]) + (pa[i] + pb[i]))
-            e1i = tension(kind, lam, g, e1[i] if kind == 2 else 0.0)
-            T[i] = -e1i * ga * gb / g * dirac(mean, g, eps, renormalised)
+            p0, p1, p2, p3, w0, w1, w2, w3 = p[i], pa[i], pb[i], pab[i], w[i], wa[i], wb[i], wab[i]
+            ga = k * (((p0 - p1) + (p2 - p3)) + ((w0 - w1) + (w2 - w3)))
+            gb = k * (((p0 - p2) + (p1 - p3)) + ((w0 - w2) + (w1 - w3)))
+            gc = k * (((p0 - w0) + (p1 - w1)) + ((p2 - w2) + (p3 - w3)))
+            across = gb * gb + gc * gc
+            g = np.sqrt(ga * ga + across + TINY)
+            mean = 0.125 * (((p0 + p3) + (p1 + p2)) + ((w0 + w3) + (w1 + w2)))
+            along = tension(kind, lam, g, e1[i] if kind == 2 else 0.0) / g * dirac(mean, g, eps, renormalised)
+            T[i] = along * (-ga * gb if shear else across)
 
 
 @loop
-def add_difference(out, T, runs, high, low, k):
-    """out += k (T at ``high`` cells' distance - T at ``low``), both in flat indices."""
+def add_normal(out, T, runs, s, h):
+    """out_a += ∂_a T_aa on low faces of a, T_aa at centres the mean of the nodes around."""
+    a, b, c, k = s[0], s[1], s[2], 0.125 / h
     for r in prange(runs.shape[0]):
         I, n = runs[r, 0], runs[r, 1]
-        q, east, west = out[I : I + n], T[I + high :], T[I + low :]
+        q, e0, e1, e2, e3 = out[I : I + n], T[I + a :], T[I + a + b :], T[I + a + c :], T[I + a + b + c :]
+        w0, w1, w2, w3 = T[I - a :], T[I - a + b :], T[I - a + c :], T[I - a + b + c :]
         for i in range(n):
-            q[i] += k * (east[i] - west[i])
+            q[i] += k * (((e0[i] - w0[i]) + (e1[i] - w1[i])) + ((e2[i] - w2[i]) + (e3[i] - w3[i])))
+
+
+@loop
+def add_shear(out, T, runs, b, c, h):
+    """out_a += ∂_b T_ab on low faces of a, T_ab on edges the mean of the two nodes along c (strides b, c)."""
+    k = 0.5 / h
+    for r in prange(runs.shape[0]):
+        I, n = runs[r, 0], runs[r, 1]
+        q, e0, e1, w0, w1 = out[I : I + n], T[I + b :], T[I + b + c :], T[I:], T[I + c :]
+        for i in range(n):
+            q[i] += k * ((e0[i] - w0[i]) + (e1[i] - w1[i]))
 
 
 @loop
