@@ -114,7 +114,7 @@ def test_what_cannot_be_shown_is_refused(tmp_path):
 
 
 def test_pictures_are_small_and_the_same_every_time(tmp_path):
-    noise = np.random.default_rng(0).random((400, 400))
+    noise = np.random.default_rng(0).random((150, 150))
     for name in "ab":
         figure, ax = style.sheet()
         ax.imshow(noise)

@@ -188,8 +188,21 @@ def test_largest_step_of_the_whole_solver(name):
     tension = 1.0 if name == "oscillating_drop" else body.stretch * 10 * (body.stretch - 1)
     assert answer["predicted_tension"] == pytest.approx(exact.step_limit(tension, 0.01, 3 / 16, 1 / 16))
     assert 1 < answer["limit"] / answer["predicted_scheme"] < 4
+    released = stability.releasable(made)
     for factor, stable in ((0.95, True), (1.1, False)):
-        assert stability.stays_bounded(made, factor * answer["limit"], 0.5)[0] is stable
+        assert stability.stays_bounded(made, factor * answer["limit"], 0.5, released)[0] is stable
+
+
+def test_energy_that_can_be_released_is_that_of_the_exact_ellipse():
+    length, circle = exact.ellipse_perimeter(0.75, 0.5), 2 * np.pi * np.sqrt(0.375)
+    drop = scene.load(SCENES / "oscillating_drop.yaml", {"box.cells": 16, "bodies.0.width.cells": 1})
+    assert stability.outline(drop.bodies[0].shape, drop.box) == pytest.approx((length, 0.375 * np.pi), rel=2e-5)
+    assert stability.releasable(drop) == pytest.approx(length - circle, rel=1e-3)
+    membrane = scene.load(
+        SCENES / "elliptic_membrane.yaml", {"bodies.0.stretch": exact.ellipse_stretch(0.75, 0.5, 0.5)}
+    )
+    energies = [exact.membrane_energy(s, 0.5, 10.0) for s in (membrane.bodies[0].stretch, np.sqrt(0.375) / 0.5)]
+    assert stability.releasable(membrane) == pytest.approx(energies[0] - energies[1], rel=1e-3)
 
 
 def test_largest_step_wants_one_body_in_the_plane():

@@ -88,7 +88,7 @@ def cost(datasets: Mapping[str, Any] | Iterable[Any]) -> str:
     def values(name):
         parts = [np.ravel(ds[name].values.astype(float)) for ds in found if name in ds]
         joined = np.concatenate([*parts, np.zeros(0)])
-        return joined[np.isfinite(joined)]
+        return joined[joined > 0]  # neither unknown nor without a grid
 
     words = []
     if (seconds := values("cpu_seconds")).size:
