@@ -30,7 +30,7 @@ COUPLING = {
 
 REFERENCE = {"color": "0.35", "linewidth": 1.0, "linestyle": (0, (6, 2))}
 SEQUENTIAL, DIVERGING = cm.batlow, cm.vik
-DPI = 140
+DPI = 125
 
 matplotlib.use("Agg")
 matplotlib.rcParams.update(
