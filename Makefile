@@ -28,7 +28,7 @@ results/scorecard.json: $(READY) FORCE
 	$(SNAKE) --config size=coarse -- $@
 
 test: $(READY)
-	$(BIN)/python -m pytest -n $(JOBS) -m "not slow"
+	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile -m "not slow"
 
 soak: $(READY)
 	$(BIN)/python -m pytest -n $(JOBS) -m slow

@@ -15,7 +15,9 @@ from fsiwork.provenance import source_hash
 from fsiwork.targets import Plan
 
 min_version("9.18")
-shell.prefix(f"PATH={quote(os.path.dirname(sys.executable))}:$PATH; ")  # the Python that runs this file
+shell.prefix(
+    f"PATH={quote(os.path.dirname(sys.executable))}:$PATH; "
+)  # the Python that runs this file
 
 SIZE = config.get("size", "coarse")
 PLAN = Plan(config.get("configs", "configs"), "results")

@@ -3,21 +3,20 @@
 
 rule warm_cache:
     output:
-        touch("results/warm_cache.done"),
+        touch("results/{size}/warm_cache.done"),
     log:
-        "logs/warm_cache.log",
+        "logs/{size}/warm_cache.log",
     params:
         configs=PLAN.configs,
         core=source_hash(),
-        size=SIZE,
     shell:
-        "NUMBA_NUM_THREADS=1 python -m fsiwork warm --configs {params.configs:q} --size {params.size:q} > {log:q} 2>&1"
+        "NUMBA_NUM_THREADS=1 python -m fsiwork warm --configs {params.configs:q} --size {wildcards.size:q} > {log:q} 2>&1"
 
 
 rule run:
     input:
         scene=PLAN.scene_of,
-        warm=ancient("results/warm_cache.done"),
+        warm=ancient("results/{size}/warm_cache.done"),
     output:
         data="results/{size}/runs/{study}/{job}.nc",
         cost="results/{size}/runs/{study}/{job}.cost.json",
@@ -40,7 +39,7 @@ rule run:
 rule call:
     input:
         scene=PLAN.scene_of,
-        warm=ancient("results/warm_cache.done"),
+        warm=ancient("results/{size}/warm_cache.done"),
     output:
         data="results/{size}/runs/{study}/{job}.json",
         cost="results/{size}/runs/{study}/{job}.cost.json",
@@ -70,7 +69,7 @@ for batched, runs in PLAN.batched(SIZE).items():
             f"batch_{batched}"
         input:
             scene=PLAN.configs / "scenes" / f"{PLAN.study(batched, SIZE).scene}.yaml",
-            warm=ancient("results/warm_cache.done"),
+            warm=ancient("results/{size}/warm_cache.done"),
         output:
             [
                 f"results/{{size}}/runs/{batched}/{run}.{ending}"

@@ -3,7 +3,7 @@
 
 rule scorecard:
     input:
-        [PLAN.file(SIZE, "checks", name) for name in BOOK],
+        [file for name in BOOK for file in PLAN.products(SIZE, name)],
     output:
         "results/scorecard.json",
         "results/scorecard.md",

@@ -154,3 +154,12 @@ def test_an_unknown_size_or_name_says_what_there_is(tmp_path):
         PLAN.book("small")
     with pytest.raises(Faults, match=r"fig_9_9: is not in .*; there are stability_1_54"):
         PLAN.entry("fig_9_9", "coarse")
+
+
+def test_the_citation_names_software_and_book():
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    version = next(line for line in (ROOT / "pyproject.toml").read_text().splitlines() if line.startswith("version"))
+    assert version == f'version = "{citation["version"]}"'
+    (book,) = citation["references"]
+    assert [author["family-names"] for author in book["authors"]] == ["Cottet", "Maitre", "Milcent"]
+    assert book["title"] == "Level Set Methods for Fluid-Structure Interaction"

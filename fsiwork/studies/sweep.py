@@ -160,9 +160,8 @@ def load(path: str | Path) -> xr.Dataset:
             values.load()
     cost = json.loads(provenance.cost_path(path).read_text(encoding="utf-8"))
     axes = list(dict.fromkeys(axis for row in cost["points"] for axis in row["point"]))
-    data = data.rename(
-        {f"{k}_i": dim for k, dim in json.loads(data.attrs.get("dims", "{}")).items() if f"{k}_i" in data}
-    )
+    for name, dim in json.loads(data.attrs.pop("dims", "{}")).items():
+        data[name] = data[name].rename({f"{name}_i": dim})
     return _with_cost(_with_rows(data, axes), cost["points"], axes)
 
 
