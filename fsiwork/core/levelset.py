@@ -87,8 +87,7 @@ def curvature(grid: Grid, phi: np.ndarray, out: np.ndarray | None = None) -> np.
     """H = div n at centres [1/length] from first and second differences (1.9); 0 where φ is flat, clipped nowhere."""
     out = np.zeros_like(phi) if out is None else out
     number = phi.dtype.type
-    floor = number(np.finfo(phi.dtype).tiny ** 0.6)
-    kernels.curvature(out, phi, *grid.rows(1, 1), *_strides(grid), number(1 / grid.h), floor)
+    kernels.curvature(out, phi, *grid.rows(1, 1), *_strides(grid), number(1 / grid.h), np.finfo(phi.dtype).tiny)
     return out
 
 

@@ -11,7 +11,7 @@ from numba import prange
 
 from fsiwork.core.kernels import loop, point
 
-TWO, QUARTER = np.float32(2), np.float32(0.25)
+ONE, TWO, QUARTER = np.float32(1), np.float32(2), np.float32(0.25)
 SERIES = tuple((-1) ** k * (math.pi / 2) ** (2 * k) / math.factorial(2 * k) for k in range(12))
 
 
@@ -141,7 +141,8 @@ def curvature(out, q, start, n, x, y, z, c, floor):
             ab = ((xpyp[i] - xpym[i]) - (xmyp[i] - xmym[i])) * QUARTER
             ad = ((xpzp[i] - xpzm[i]) - (xmzp[i] - xmzm[i])) * QUARTER
             bd = ((ypzp[i] - ypzm[i]) - (ymzp[i] - ymzm[i])) * QUARTER
-            g = a * a + b * b + d * d + floor
+            # The unit normal first: a division by g³ᐟ² lets LLVM form g³, which underflows in single precision.
+            k = ONE / math.sqrt(a * a + b * b + d * d + floor)
+            a, b, d = a * k, b * k, d * k
             f = (bb + dd) * a * a + (aa + dd) * b * b + (aa + bb) * d * d
-            f -= TWO * (a * b * ab + a * d * ad + b * d * bd)
-            o[i] = c * f / (g * math.sqrt(g))
+            o[i] = c * k * (f - TWO * (a * b * ab + a * d * ad + b * d * bd))
