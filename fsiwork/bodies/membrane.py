@@ -189,7 +189,8 @@ class Membrane(Body):
         for a, s in enumerate(g.strides):
             kernels.carry_along(self._right.ravel(), self.phi, flow.u[a], start, n, s, 0.25 * dt / g.h, a == 0)
         c = max(float(self.survey()[kernels.PULL]), 0.0) / self._least_density(flow)
-        g.inside(self._tilde)[...] = self._solver.solve(self._right, 1.0, c * dt**2 / self.eps)
+        smoothing = c * dt**2 / self.eps
+        g.inside(self._tilde)[...] = self._solver.solve(self._right, 1.0, smoothing) if smoothing else self._right
         self.edges.fill_scalar(self._tilde, "mirror")
         return self._tilde
 

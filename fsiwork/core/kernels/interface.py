@@ -17,7 +17,7 @@ LENGTH, ENERGY, LEAST, MOST, PULL, TENSION, MODULUS, PEAK = range(8)  # columns 
 
 @loop
 def mark(flags, phi, start, n, s, near, slack):
-    """flags = 1 where |φ| < near + slack Σ-of-steepest one-sided differences; slack in cells' widths.
+    """flags = 1 where |φ| < near + slack · root of Σ_a (steeper one-sided difference)²; slack in cells.
 
     One-sided: in a body thinner than cells the central gradient vanishes, these do not.
     """
@@ -61,8 +61,8 @@ def assemble(runs, inside, flags, start, n, interior):
 
 @point
 def modulus(A, B):
-    """M of MEASURED-coupling 6: the largest of A s² + B s (1 - s) over 0 ≤ s ≤ 1, and never below zero."""
-    return max(A, 0.0) if B <= max(2.0 * A, 0.0) else B * B / (4.0 * (B - A))
+    """As `bodies.laws.modulus`: the largest of A s² + B s (1 - s) over 0 ≤ s ≤ 1, and never below zero."""
+    return max(A, 0.0) if max(2.0 * A, 0.0) >= B else B * B / (4.0 * (B - A))
 
 
 @loop
