@@ -50,10 +50,13 @@ class Writer:
             self.blocks.append((name, index, _hash(values)))
 
     def close(self, attributes: dict[str, Any]) -> None:
-        """Write the global attributes, last, so that a file without them is not finished, and close."""
-        self.file.sync()
-        self.file.setncatts(attributes)
+        """Write the global attributes and close; ``ended`` only when all else is in the file, because a file that a
+        kill left half closed may open: without ``ended`` nobody takes it for finished."""
+        path = self.file.filepath()
+        self.file.setncatts({name: value for name, value in attributes.items() if name != "ended"})
         self.file.close()
+        with netCDF4.Dataset(path, "a") as file:
+            file.ended = attributes["ended"]
 
 
 def _hash(values: np.ndarray) -> str:
