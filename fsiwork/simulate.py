@@ -55,7 +55,7 @@ def longest_step(flow: Flow, bodies: tuple[Body, ...]) -> dict[str, float]:
     h, dim = flow.grid.h, flow.grid.dim
     speed = sum(flow.largest(u) for u in flow.u)
     limits = {"advective": 0.5 * h / speed if speed > 0.0 else math.inf}
-    if not flow.implicit and flow.viscosity > 0.0:
+    if flow.theta == 0.0 and flow.viscosity > 0.0:
         limits["viscous"] = h**2 * flow.density / (4 * dim * flow.viscosity)  # AB2 ends at -1 on the real axis
     for body in bodies:
         for name, limit in body.longest_step(flow).items():

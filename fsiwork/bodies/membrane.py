@@ -20,6 +20,7 @@ COUPLINGS = ("explicit", "semi-implicit", "stabilised", "iterated")
 STABILISER = {"stabilised": 0.35, "iterated": 0.5}  # c ≥ 1/4 in theory; measured stable (MEASURED-coupling 1)
 IN_TIME = 4.0  # a step this often (1.54) costs about three percent of the oscillation where it is stable
 XYZ = "xyz"
+SUMS = [kernels.LENGTH, kernels.ENERGY, kernels.PULL]
 
 
 class Membrane(Body):
@@ -175,12 +176,16 @@ class Membrane(Body):
             kernels.survey(table, self.phi, runs, self._s, law.kind, self._pull.numbers, law.given)
             self._values = np.array([0.0, 0.0, np.nan, np.nan, 0.0, 0.0, 0.0, 0.0])
             if runs.shape[0] and table[:, kernels.MOST].max() > 0.0:
-                self._values[:2] = table[:, :2].sum(axis=0) * self.grid.cell_volume
-                self._values[2], self._values[3:] = table[:, 2].min(), table[:, 3:].max(axis=0)
+                self._values[:] = table.max(axis=0)
+                self._values[SUMS] = table[:, SUMS].sum(axis=0) * self.grid.cell_volume
+                self._values[kernels.LEAST] = table[:, kernels.LEAST].min()
         return self._values
 
     def predict(self, flow, dt: float) -> np.ndarray:
-        """φ̃ of (3.62), flat: (φ̃ - φ)/Δt - c(Δt/ε)Δφ̃ = -u·∇φ, c = max(E', 0)/ρ over the band, ∂_nφ̃ = 0 on walls."""
+        """φ̃ of (3.62), flat: (φ̃ - φ)/Δt - c(Δt/ε)Δφ̃ = -u·∇φ, ∂_nφ̃ = 0 on walls, with c = max(E', 0)/ρ.
+
+        E' is its mean over the interface: its maximum over the band grows with the noise at the band's edges.
+        """
         g = self.grid
         if self._solver is None:
             ends = [("periodic",) * 2 if self.edges.periodic(a) else ("neumann",) * 2 for a in g.axes]
@@ -188,7 +193,9 @@ class Membrane(Body):
         start, n = g.rows()
         for a, s in enumerate(g.strides):
             kernels.carry_along(self._right.ravel(), self.phi, flow.u[a], start, n, s, 0.25 * dt / g.h, a == 0)
-        c = max(float(self.survey()[kernels.PULL]), 0.0) / self._least_density(flow)
+        values = self.survey()
+        tension = values[kernels.PULL] / values[kernels.LENGTH] if values[kernels.LENGTH] > 0.0 else 0.0
+        c = max(float(tension), 0.0) / self._least_density(flow)
         smoothing = c * dt**2 / self.eps
         g.inside(self._tilde)[...] = self._solver.solve(self._right, 1.0, smoothing) if smoothing else self._right
         self.edges.fill_scalar(self._tilde, "mirror")
@@ -238,10 +245,12 @@ class Membrane(Body):
         return min(flow.density, self.inside[0]) if self.inside else flow.density
 
     def _limit(self, flow, T: float) -> float:
-        """(1.54): με + √(μ²ε² + ½ λ ε Δx² ρ), over λ."""
+        """(1.54): με + √(μ²ε² + ½ λ ε Δx² ρ), over λ, with (2θ - 1)μ in place of μ: Crank-Nicolson gains nothing by
+        viscosity. A mixture is solved with θ = 1."""
         if not T > 0.0:
             return np.inf
         mu = min(flow.viscosity, self.inside[1]) if self.inside else flow.viscosity
-        damping = mu * self.eps
+        theta = 1.0 if self.inside or self.surface_mass else flow.theta
+        damping = max(2.0 * theta - 1.0, 0.0) * mu * self.eps
         root = np.sqrt(damping**2 + 0.5 * T * self._least_density(flow) * self.eps * self.grid.h**2)
         return float((damping + root) / T)

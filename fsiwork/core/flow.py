@@ -13,7 +13,8 @@ from fsiwork.core.multigrid import Variable
 from fsiwork.core.poisson import Direct, Lines
 
 LINES_UP_TO = 4.0  # α/Δx² up to which the line factorisation serves (MEASURED-poisson 2); beyond it the exact solve
-REST = {"upwind5": 1.0, "central": 1.0, "none": 0.0}
+ADVECTION = {"upwind5": 1.0, "central": 1.0, "none": 0.0}
+THETA = {"explicit": 0.0, "implicit": 0.5, "backward-euler": 1.0}  # share of Δu at the new time
 
 
 class Flow:
@@ -25,7 +26,8 @@ class Flow:
     rho, mu : density [mass/length^d] and dynamic viscosity [mass length^(2-d)/time] of the fluid
     gravity : acceleration [length/time²], one number a direction
     advection : ``upwind5`` (linear upwind of order 5), ``central`` (keeps energy) or ``none`` (Stokes)
-    diffusion : ``implicit`` (Crank-Nicolson) or ``explicit`` (AB2)
+    diffusion : ``implicit`` (Crank-Nicolson), ``backward-euler`` (the book's (3.63): first order, damps more) or
+        ``explicit`` (AB2)
     """
 
     def __init__(
@@ -34,7 +36,7 @@ class Flow:
         self.grid, self.edges = grid, edges
         self.density, self.viscosity = float(rho), float(mu)
         self.gravity = tuple(gravity or (0.0,) * grid.dim)
-        self.advection, self.implicit = advection, diffusion == "implicit"
+        self.advection, self.theta = advection, THETA[diffusion]
         self.u = [grid.field() for _ in grid.axes]
         self.p, self.before = grid.field(), grid.field()
         self.dt_old = 0.0  # no history yet: the first step is Euler's
@@ -91,7 +93,7 @@ class Flow:
         if self.rho is not None or self.mu is not None:
             kappa = self._prepare_mixture(dt)
         else:
-            kappa = 0.5 * dt * self.viscosity / self.density if self.implicit else 0.0
+            kappa = self.theta * dt * self.viscosity / self.density
         kappa += self.stiffness * dt**2
         self.dt = dt
         for c in self.grid.axes:
@@ -148,9 +150,9 @@ class Flow:
         coefficients = (
             dt * (1.0 + 0.5 * ratio),
             -0.5 * dt * ratio,
-            REST[self.advection] / h,
-            0.0 if self.implicit else nu / h**2,
-            dt * nu / h**2 if self.implicit else 0.0,
+            ADVECTION[self.advection] / h,
+            0.0 if self.theta else nu / h**2,
+            dt * nu / h**2 if self.theta else 0.0,
             dt / (self.density * h) if constant else 0.0,
             0.0 if self._force is None else dt / self.density if constant else dt,
             dt * self.gravity[c],
@@ -226,7 +228,7 @@ class Flow:
                     kernels.add_viscous_tangential(force[c], self.u[c], self.u[b], mu, start, n, sc, sb, g.h**-2)
             kernels.accelerate(force[c], self.p, self._beta[c], start, n, g.strides[c], 1.0 / g.h)
         np.divide(mu, rho, out=self._star[0])
-        return dt * self.largest(self._star[0]) if self.implicit else 0.0
+        return dt * self.largest(self._star[0]) if self.theta else 0.0
 
     def _correct(self, c: int, psi: np.ndarray, factor: float) -> None:
         g = self.grid

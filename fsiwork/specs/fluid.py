@@ -36,7 +36,7 @@ class Fluid(Spec):
     viscosity: NotNegative
     gravity: Vector = ()
     advection: Literal["none", "central", "upwind5"] = "upwind5"
-    diffusion: Literal["implicit", "explicit"] = "implicit"
+    diffusion: Literal["implicit", "backward-euler", "explicit"] = "implicit"
     initial: Initial = Rest()
 
 

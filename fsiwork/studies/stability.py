@@ -183,7 +183,8 @@ def largest_step(scene, point: dict[str, Any]) -> dict[str, Any]:
     body, h = scene.bodies[0], scene.box.h
     tension = body.stretch * _energy(body.energy, body.stretch)[1]
     numbers = scene.fluid.viscosity, body.width.of(h), h, scene.fluid.density
-    theta = 0.5 if body.inside is None and body.surface_mass == 0 else 1.0
+    mixed = body.inside is not None or body.surface_mass > 0
+    theta = 0.5 if scene.fluid.diffusion == "implicit" and not mixed else 1.0
     by_stiffness = float(step_limit(getattr(body.energy, "stiffness", math.nan), *numbers))
     by_tension = float(step_limit(tension, *numbers)) if tension > 0 else math.nan
     by_scheme = float(step_limit(tension, *numbers, theta=theta)) if tension > 0 else math.nan

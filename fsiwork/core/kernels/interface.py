@@ -67,8 +67,8 @@ def modulus(A, B):
 
 @loop
 def survey(out, phi, runs, s, kind, numbers, given):
-    """One row of ``out`` a run: sums of |∇φ| D_ε and E D_ε, extremes over D_ε > 0 of
-    |∇φ| (two), E', |∇φ|E', M(E'|∇φ|, E''|∇φ|²) and M D_ε. ``given[0..2]``: E, E', E'' for kind 2."""
+    """One row of ``out`` a run: sums of |∇φ| D_ε and E D_ε, extremes of |∇φ| over D_ε > 0, the sum of E'|∇φ| D_ε, and
+    largest |∇φ|E', M(E'|∇φ|, E''|∇φ|²) and M D_ε. ``given[0..2]``: E, E', E'' for kind 2."""
     a, b, c = s[0], s[1], s[2]
     h, eps, renormalised, lam = numbers[0], numbers[1], numbers[2] > 0.0, numbers[3]
     k = 0.5 / h
@@ -76,7 +76,7 @@ def survey(out, phi, runs, s, kind, numbers, given):
         I, n, o = runs[r, 0], runs[r, 1], runs[r, 2]
         p, e0, e1, e2 = phi[I:], given[0, o:], given[1, o:], given[2, o:]
         ae, aw, be, bw, ce, cw = phi[I + a :], phi[I - a :], phi[I + b :], phi[I - b :], phi[I + c :], phi[I - c :]
-        length, energy, least, most, pull, tense, stiff, peak = 0.0, 0.0, np.inf, 0.0, -np.inf, -np.inf, 0.0, 0.0
+        length, energy, least, most, pull, tense, stiff, peak = 0.0, 0.0, np.inf, 0.0, 0.0, -np.inf, 0.0, 0.0
         for i in range(n):
             ga, gb, gc = k * (ae[i] - aw[i]), k * (be[i] - bw[i]), k * (ce[i] - cw[i])
             g = np.sqrt(ga * ga + gb * gb + gc * gc + TINY)
@@ -88,7 +88,7 @@ def survey(out, phi, runs, s, kind, numbers, given):
             E2 = e2[i] if kind == 2 else (0.0 if kind == 0 else lam)
             M = modulus(E1 * g, E2 * g * g)
             length, energy = length + D * g, energy + D * E0
-            least, most, pull = min(least, g), max(most, g), max(pull, E1)
+            least, most, pull = min(least, g), max(most, g), pull + D * g * E1
             tense, stiff, peak = max(tense, E1 * g), max(stiff, M), max(peak, M * D)
         out[r, LENGTH], out[r, ENERGY], out[r, LEAST], out[r, MOST] = length, energy, least, most
         out[r, PULL], out[r, TENSION], out[r, MODULUS], out[r, PEAK] = pull, tense, stiff, peak
