@@ -53,7 +53,8 @@ def iterate(flow: Flow, bodies: tuple[Body, ...], dt: float, times: int) -> None
 def longest_step(flow: Flow, bodies: tuple[Body, ...]) -> dict[str, float]:
     """Every limit on Δt by name [time]; infinite where nothing limits."""
     h, dim = flow.grid.h, flow.grid.dim
-    speed = sum(flow.largest(u) for u in flow.u)
+    sides = [side.velocity for pair in flow.edges.sides for side in pair if side.velocity]
+    speed = sum(max(flow.largest(u), *(abs(v[a]) for v in sides), 0.0) for a, u in enumerate(flow.u))
     limits = {"advective": 0.5 * h / speed if speed > 0.0 else math.inf}
     if flow.theta == 0.0 and flow.viscosity > 0.0:
         limits["viscous"] = h**2 * flow.density / (4 * dim * flow.viscosity)  # AB2 ends at -1 on the real axis
@@ -96,15 +97,16 @@ class Simulation:
     @property
     def frame_time(self) -> float:
         """Time of the next frame."""
-        return self.scene.clock.end * (self.frame_number + 1) / self.scene.clock.frames
+        return self.scene.clock.end * ((self.frame_number + 1) / self.scene.clock.frames)
 
     def advance(self) -> str:
         """One step; returns why the run has diverged, or nothing."""
+        left = 0  # steps to the next frame, as far as one knows
         if self.automatic:
             self.limits = longest_step(self.flow, self.bodies)
-            left = self.frame_time - self.t
-            longest = self.scene.clock.safety * min(self.limits.values())
-            self.dt = left / max(1, math.ceil(left / longest - 1e-9)) if longest > 0.0 else left
+            rest, longest = self.frame_time - self.t, self.scene.clock.safety * min(self.limits.values())
+            left = max(1, math.ceil(rest / longest - 1e-9)) if longest > 0.0 else 1
+            self.dt = rest / left
         try:
             if self.passes > 1:
                 iterate(self.flow, self.bodies, self.dt, self.passes)
@@ -113,13 +115,26 @@ class Simulation:
         except NotConverged as error:
             return self._obituary(str(error))
         self.steps += 1
-        self.t = self.t + self.dt if self.automatic else self.scene.clock.end * self.steps / self.total
-        return self._guard()
+        if not self.automatic:
+            self.t = self.scene.clock.end * (self.steps / self.total)
+        else:
+            self.t = self.frame_time if left == 1 else self.t + self.dt
+        fault = self._guard()
+        if not fault:
+            self._blend()
+        return fault
+
+    def _blend(self) -> None:
+        """ρ and μ of this moment, for those who look: the step used those of its beginning."""
+        if self.flow.rho is not None or self.flow.mu is not None:
+            self.flow.begin()
+            for body in self.bodies:
+                body.blend(self.flow, 0.0)
 
     def at_frame(self) -> bool:
         """Whether the next frame is due."""
         if self.automatic:
-            return self.t >= self.frame_time * (1 - 1e-12)
+            return self.t >= self.frame_time
         return self.steps >= round(self.total * (self.frame_number + 1) / self.scene.clock.frames)
 
     def gauges(self) -> dict[str, float | list[float]]:
@@ -167,6 +182,7 @@ class Simulation:
         clock = [self.t, self.steps, self.frame_number, self.dt]
         before = [self._before.get(k, math.nan) for k in ("t", "total", "gain")]
         state |= {"clock": np.array(clock), "before": np.array(before)}
+        state |= {f"limit.{k}": np.array(v) for k, v in self.limits.items()}
         return state | {f"row.{k}": v for k, v in _columns(self.rows).items()}
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
@@ -174,11 +190,13 @@ class Simulation:
         self.flow.restore(_part(state, "flow."))
         for i, body in enumerate(self.bodies):
             body.restore(_part(state, f"body{i}."))
+        self._blend()
         self.t, self.steps, self.frame_number, self.dt = (
             kind(x) for kind, x in zip(KINDS, state["clock"], strict=True)
         )
         if not np.isnan(state["before"]).any():
             self._before = dict(zip(("t", "total", "gain"), map(float, state["before"]), strict=True))
+        self.limits = {k: float(v) for k, v in _part(state, "limit.").items()}
         columns = _part(state, "row.")
         length = len(next(iter(columns.values()))) if columns else 0
         self.rows = [{k: v[i] for k, v in columns.items()} for i in range(length)]
@@ -244,7 +262,8 @@ def frames(
         if due or sim.steps % scene.output.gauges_every == 0:
             sim.rows.append(sim.gauges())
         if due:
-            sim.frame_number += 1
+            while sim.at_frame() and sim.frame_number < scene.clock.frames:  # two at once: more frames than steps
+                sim.frame_number += 1
             yield sim.frame("complete" if sim.frame_number == scene.clock.frames else "")
 
 
@@ -270,9 +289,8 @@ def _of_bodies(name: str, answers: list[dict], grid: Grid) -> dict[str | tuple[s
     found = {}
     for number, answer in enumerate(answers):
         for key, q in answer.items():
-            if key == name or (name == "Y" and key.startswith("map_")):
-                label = key.replace("map_", "Y_")
-                found[label if len(answers) == 1 else (label, number)] = None, grid.inside(q).copy()
+            if key == name or (name == "Y" and key.startswith("Y_")):
+                found[key if len(answers) == 1 else (key, number)] = None, grid.inside(q).copy()
     return found
 
 
