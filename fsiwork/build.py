@@ -23,11 +23,6 @@ def parts(scene: Scene) -> tuple[Flow, tuple[Body, ...]]:
     return flow, tuple(BODIES[spec.kind](spec, grid, edges) for spec in scene.bodies)
 
 
-def passes(scene: Scene) -> int:
-    """How often a step is taken: twice where a body iterates its coupling."""
-    return 2 if any(getattr(spec, "coupling", "") == "iterated" for spec in scene.bodies) else 1
-
-
 def _membrane(spec, grid: Grid, edges: Edges) -> Membrane:
     carried = spec.transport
     return Membrane(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fsiwork.bodies.body import Body
-from fsiwork.build import parts, passes
+from fsiwork.build import parts
 from fsiwork.core import energy
 from fsiwork.core.flow import Flow
 from fsiwork.core.grid import Grid
@@ -43,7 +43,7 @@ def iterate(flow: Flow, bodies: tuple[Body, ...], dt: float, times: int) -> None
             flow.restore(before[0])
             for body, state, guess in zip(bodies, before[1], guesses, strict=True):
                 body.restore(state)
-                body.guess = guess["phi"]
+                body.guess = guess
         step(flow, bodies, dt)
     flow.guess = None
     for body in bodies:
@@ -84,7 +84,8 @@ class Simulation:
     """A scene in motion: flow, bodies and clock."""
 
     def __init__(self, scene: Scene, flow: Flow, bodies: tuple[Body, ...]):
-        self.scene, self.flow, self.bodies, self.passes = scene, flow, bodies, passes(scene)
+        self.scene, self.flow, self.bodies = scene, flow, bodies
+        self.passes = max((body.passes for body in bodies), default=1)
         clock = scene.clock
         self.automatic = clock.step == "auto"
         self.total = 0 if self.automatic else max(1, math.ceil(clock.end / clock.step - 1e-9))
