@@ -211,21 +211,18 @@ class Simulation:
         return Frame(self.t, self.steps, self.fields(names or self.scene.output.fields), gauges, self.state, ended)
 
     def _guard(self) -> str:
-        """Look at the velocity every step."""
-        fastest = [self.flow.largest(u) for u in self.flow.u]
-        if all(v * self.dt <= RUNAWAY * self.flow.grid.h for v in fastest):  # false for NaN
-            return ""
-        return self._obituary(None)
-
-    def _obituary(self, reason: str | None) -> str:
-        """When, where and why: ``diverged at t=… (step …): |u| = inf at cell (3, 7); Δt = … exceeds …``."""
+        """Look at velocity and bodies every step."""
         g = self.flow.grid
-        if reason is None:
-            sizes = [np.abs(g.inside(u)) for u in self.flow.u]
-            worst = [float(np.where(np.isnan(s), np.inf, s).max()) for s in sizes]
-            a = int(np.argmax(worst))
-            cell = np.unravel_index(int(np.where(np.isnan(sizes[a]), np.inf, sizes[a]).argmax()), g.n)
-            reason = f"|{'uvw'[a]}| = {worst[a]:.3g} at cell ({', '.join(str(int(k)) for k in cell)})"
+        if not all(self.flow.largest(u) * self.dt <= RUNAWAY * g.h for u in self.flow.u):  # false for NaN
+            return self._obituary(_worst(dict(zip("uvw", map(g.inside, self.flow.u), strict=False))))
+        for body in self.bodies:
+            for name, q in body.fields().items():
+                if not math.isfinite(q.sum()):
+                    return self._obituary(_worst({name: g.inside(q)}))
+        return ""
+
+    def _obituary(self, reason: str) -> str:
+        """When, where and why: ``diverged at t=… (step …): |u| = inf at cell (3, 7); Δt = … exceeds …``."""
         broken = [f"{name} {limit:.3g}" for name, limit in self.limits.items() if self.dt > limit]
         why = f"Δt = {self.dt:.3g} exceeds {', '.join(broken)}" if broken else "no known limit was exceeded"
         return f"diverged at t={self.t:.6g} (step {self.steps}): {reason}; {why}"
@@ -283,6 +280,14 @@ def vorticity(flow: Flow) -> np.ndarray:
     curl = ((v - np.roll(v, 1, 0)) - (u - np.roll(u, 1, 1))) / h  # on the low corner
     corners = curl + np.roll(curl, -1, 0)
     return g.inside(0.25 * (corners + np.roll(corners, -1, 1))).copy()
+
+
+def _worst(fields: dict[str, np.ndarray]) -> str:
+    """The largest value of some fields, and the cell where it is; what is no number counts as infinite."""
+    sizes = {name: np.where(np.isnan(q), np.inf, np.abs(q)) for name, q in fields.items()}
+    name = max(sizes, key=lambda key: sizes[key].max())
+    cell = np.unravel_index(int(sizes[name].argmax()), sizes[name].shape)
+    return f"|{name}| = {sizes[name].max():.3g} at cell ({', '.join(str(int(k)) for k in cell)})"
 
 
 def _of_bodies(name: str, answers: list[dict], grid: Grid) -> dict[str | tuple[str, int], tuple[None, np.ndarray]]:
