@@ -1,0 +1,155 @@
+"""Flow and membrane: cell-steps a second, each stage of a step, the share of Python, memory allocated by a step.
+
+A share of the bandwidth counts only what any program must move: every field that a stage reads, once, and every field
+that it writes, once, whatever the number of passes the stage takes.
+"""
+
+import sys
+import tracemalloc
+
+import numpy as np
+
+from benchmarks.rows import Row, row
+from benchmarks.timing import least, triad
+from fsiwork.scene import Scene
+from fsiwork.simulate import Simulation, build, step
+
+RATE = "million cell-steps/s"
+
+
+def flow(n: int, dim: int, advection: str, diffusion: str) -> Simulation:
+    """A swirl in a free-slip box of n cells a side."""
+    scene = {
+        "box": {"length": [2.0] * dim, "cells": n, "edges": "free-slip"},
+        "fluid": {"viscosity": 1e-3, "advection": advection, "diffusion": diffusion},
+        "clock": {"end": 1.0, "step": 0.4 / n, "frames": 1},
+    }
+    sim = build(Scene.model_validate(scene))
+    _swirl(sim)
+    return sim
+
+
+def membrane(n: int, dim: int) -> Simulation:
+    """The book's stretched ellipse (Sec. 3.5.3; in 3D an ellipsoid), n cells a side, explicit coupling, φ by WENO5."""
+    kind, axes = ("ellipse", [0.75, 0.5]) if dim == 2 else ("ellipsoid", [0.75, 0.5, 0.5])
+    body = {
+        "kind": "membrane",
+        "shape": {"kind": kind, "centre": [1.0] * dim, "semi_axes": axes},
+        "stretch": 1.2625,
+        "energy": {"kind": "quadratic", "stiffness": 1.0},
+        "width": {"cells": 3},
+        "coupling": "explicit",
+        "transport": {"scheme": "weno5"},
+    }
+    scene = {
+        "box": {"length": [2.0] * dim, "cells": n, "edges": "walls"},
+        "fluid": {"viscosity": 0.01},
+        "bodies": [body],
+        "clock": {"end": 1.0, "step": 0.05 / n, "frames": 1},
+    }
+    return build(Scene.model_validate(scene))
+
+
+def _swirl(sim: Simulation) -> None:
+    """u = sin(πx/2) cos(πy/2), v = -cos(πx/2) sin(πy/2), in the plane of the first two directions."""
+    g, q = sim.flow.grid, np.pi / 2.0
+    u, v = g.points(0), g.points(1)
+    g.padded(sim.flow.u[0])[...] = np.sin(q * u[0]) * np.cos(q * u[1]) + 0.0 * u[-1]
+    g.padded(sim.flow.u[1])[...] = -np.cos(q * v[0]) * np.sin(q * v[1]) + 0.0 * v[-1]
+    sim.flow.edges.fill_velocity(sim.flow.u)
+
+
+def verbs(sim: Simulation) -> dict:
+    """The stages of `simulate.step`, in its order."""
+    flow, bodies, dt = sim.flow, sim.bodies, sim.dt
+
+    def push():
+        flow.begin()
+        for body in bodies:
+            body.blend(flow, dt)
+            body.push(flow, dt)
+
+    def move():
+        for body in bodies:
+            body.move(flow, dt)
+
+    return {"push": push, "predict": lambda: flow.predict(dt), "project": lambda: flow.project(dt), "move": move}
+
+
+def fields_moved(dim: int) -> dict[str, int]:
+    """Fields that a stage must read or write: old terms of advection twice; a pressure and the one before."""
+    return {"push": 1 + dim, "predict": 4 * dim + 1, "project": 2 * dim + 3, "move": dim + 2}
+
+
+def rate(name: str, sim: Simulation, mark: str, seconds: float = 2.0) -> Row:
+    """Million cell-steps a second of the whole `step`."""
+    cells, dim = sim.flow.grid.cells, sim.flow.grid.dim
+    took = least({"step": lambda: step(sim.flow, sim.bodies, sim.dt)}, seconds)["step"]
+    moved = fields_moved(dim)
+    count = sum(moved.values()) if sim.bodies else moved["predict"] + moved["project"]
+    roof = triad(cells) / (8 * count) * 1e-6
+    per_second = cells / took * 1e-6
+    return row(name, per_second, RATE, mark, against=("bandwidth", roof), share=per_second / roof)
+
+
+def stages(name: str, sim: Simulation, seconds: float = 4.0) -> list[Row]:
+    """Time per cell of each stage."""
+    cells = sim.flow.grid.cells
+    took, moved = least(verbs(sim), seconds), fields_moved(sim.flow.grid.dim)
+    total, rows = sum(took.values()), []
+    for verb, t in took.items():
+        roof = 8 * moved[verb] / triad(cells) * 1e9
+        ns = t / cells * 1e9
+        note = f"{100 * t / total:.0f} % of the step"
+        rows.append(row(f"{name}_{verb}", ns, "ns a cell", against=("bandwidth", roof), share=roof / ns, note=note))
+    return rows
+
+
+def python_share(n: int = 512, seconds: float = 2.0) -> Row:
+    """What a step costs on no cells at all (from 16² and 32²), over what it costs on n²."""
+    took = {}
+    for k in (16, 32, n):
+        sim = membrane(k, 2)
+        took[k] = least({"step": lambda sim=sim: step(sim.flow, sim.bodies, sim.dt)}, seconds)["step"]
+    nothing = (4.0 * took[16] - took[32]) / 3.0
+    note = f"{nothing * 1e3:.2f} ms of {took[n] * 1e3:.2f} ms a step, calls of kernels included"
+    return row("python_share", nothing / took[n], f"of a membrane step at {n}²", note=note)
+
+
+def allocation(n: int = 512) -> Row:
+    """Largest rise of the memory in use between two calls anywhere inside a step [byte]: bounds its largest block.
+
+    Python's and NumPy's memory; kernels allocate nothing larger than what they are given.
+    """
+    sim = membrane(n, 2)
+    for _ in range(3):
+        step(sim.flow, sim.bodies, sim.dt)
+    rises = [0]
+
+    def watch(_frame, _event, _arg):
+        now, peak = tracemalloc.get_traced_memory()
+        rises.append(max(peak - watch.level, 0))
+        tracemalloc.reset_peak()
+        watch.level = now
+
+    tracemalloc.start()
+    step(sim.flow, sim.bodies, sim.dt)  # objects that tracing itself makes once
+    before, _ = tracemalloc.get_traced_memory()
+    watch.level = before
+    tracemalloc.reset_peak()
+    sys.setprofile(watch)
+    try:
+        step(sim.flow, sim.bodies, sim.dt)
+    finally:
+        sys.setprofile(None)
+        kept = tracemalloc.get_traced_memory()[0] - before
+        tracemalloc.stop()
+    one = 8 * (n + 6)
+    return row(
+        "allocation",
+        max(rises),
+        f"byte at once, at {n}²",
+        f"<= {one}",
+        against=("a row", one),
+        note=f"{sum(rises) / 1024:.0f} KiB in the whole step, {max(kept, 0)} byte kept",
+    )
