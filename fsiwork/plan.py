@@ -156,11 +156,11 @@ def _solvers(scene: Scene, step: float) -> list[tuple[str, str, float]]:
     found = [("pressure", "multigrid", 16.0) if variable else ("pressure", "direct", 2.5)]
     stabilised = any(body.coupling in ("stabilised", "iterated") for body in scene.bodies)
     alpha = 0.0
-    if fluid.diffusion == "implicit":
+    if fluid.diffusion != "explicit":
         nu = [(fluid.viscosity, fluid.density)]
         nu += [(b.inside.viscosity, b.inside.density) for b in scene.bodies if b.inside]
         worst = max(mu for mu, _ in nu) / min(rho for _, rho in nu) if variable else fluid.viscosity / fluid.density
-        alpha = (1.0 if variable else 0.5) * step * worst / h**2
+        alpha = (0.5 if fluid.diffusion == "implicit" and not variable else 1.0) * step * worst / h**2
     if stabilised or alpha > 4.0:
         found.append(("diffusion", "direct", 2.0 * dim))
     elif alpha > 0.0:
