@@ -1,5 +1,6 @@
 """The README is true: its code runs, its commands exist, its map shows the house as it is."""
 
+import json
 import re
 import shlex
 from pathlib import Path
@@ -7,7 +8,9 @@ from pathlib import Path
 import pytest
 
 from fsiwork.__main__ import main
+from fsiwork.figures.readme import put_costs
 from fsiwork.scene import loads
+from fsiwork.targets import Plan
 
 ROOT = Path(__file__).resolve().parents[1]
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -111,3 +114,22 @@ def test_marks_for_measured_tables_are_there_once():
     for name in ("benchmarks", "cost"):
         assert TEXT.count(f"<!-- {name} -->") == TEXT.count(f"<!-- /{name} -->") == 1
         assert TEXT.index(f"<!-- {name} -->") < TEXT.index(f"<!-- /{name} -->")
+
+
+def test_the_costs_of_the_book_are_sums_of_its_studies(tmp_path):
+    plan = Plan(ROOT / "configs", tmp_path)
+    studies = ("pressure_moving", "pressure_rest")
+    for k, name in enumerate(studies):
+        path = Path(plan.file("coarse", "studies", name)).with_suffix(".cost.json")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps({"cpu_seconds": 1000.0 * (k + 1), "steps": 5 + k}))
+    readme = tmp_path / "README.md"
+    readme.write_text("before\n<!-- cost -->\nold\n<!-- /cost -->\nafter\n")
+    put_costs(readme, plan)
+    lines = readme.read_text().splitlines()
+    assert lines[:2] == ["before", "<!-- cost -->"] and lines[-2:] == ["<!-- /cost -->", "after"]
+    assert "old" not in lines
+    assert "| `fig_3_13` | 1,000 | 5 | – | – |" in lines
+    assert "| `fig_3_14` | 3,000 | 11 | – | – |" in lines
+    assert "| all that was run | 3,000 | 11 | 0 | 0 |" in lines
+    assert len(lines) == 7 + len(plan.book("coarse"))

@@ -1,12 +1,15 @@
-"""The picture on the README's first screen: a stretched membrane relaxes (`make pictures`)."""
+"""What the README shows: the picture on its first screen, and what the book costs (`make pictures`)."""
 
+import json
 import sys
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
 from fsiwork.figures import style
+from fsiwork.targets import SIZES, Plan
 
 RADIUS = np.sqrt(0.75 * 0.5)  # of the circle with the ellipse's area: the exact equilibrium
 TIMES = (0.1, 0.3, 4.0)
@@ -54,8 +57,42 @@ def _half_axes(ax, ds: xr.Dataset) -> None:
     ax.legend(loc="upper right")
 
 
-if __name__ == "__main__":  # RUN.nc PICTURE.png
+def costs(plan: Plan) -> str:
+    """Markdown table: CPU seconds and steps of each artefact's studies at both sizes, "–" for what was not run.
+
+    A study that serves two artefacts counts once in the sum.
+    """
+    head = "| artefact | " + " | ".join(f"{size}: CPU s | steps" for size in SIZES) + " |"
+    lines, spent = [head, "|---|" + "---:|" * (2 * len(SIZES))], {}
+    for name in plan.book(SIZES[0]):
+        cells = []
+        for size in SIZES:
+            files = [
+                Path(plan.file(size, "studies", s)).with_suffix(".cost.json") for s in plan.entry(name, size).studies
+            ]
+            found = {file: json.loads(file.read_text(encoding="utf-8")) for file in files if file.is_file()}
+            spent.setdefault(size, {}).update(found)
+            cells += _sums(found.values()) if len(found) == len(files) else ["–", "–"]
+        lines.append(f"| `{name}` | {' | '.join(cells)} |")
+    sums = [cell for size in SIZES for cell in _sums(spent[size].values())]
+    return "\n".join([*lines, f"| all that was run | {' | '.join(sums)} |"])
+
+
+def _sums(found) -> list[str]:
+    parts = list(found)
+    return [f"{sum(part['cpu_seconds'] for part in parts):,.0f}", f"{sum(part['steps'] for part in parts):,}"]
+
+
+def put_costs(readme: Path, plan: Plan) -> None:
+    """Write `costs` between its marks in the README."""
+    before, rest = readme.read_text(encoding="utf-8").split("<!-- cost -->\n")
+    after = rest.split("<!-- /cost -->")[1]
+    readme.write_text(f"{before}<!-- cost -->\n{costs(plan)}\n<!-- /cost -->{after}", encoding="utf-8")
+
+
+if __name__ == "__main__":  # RUN.nc PICTURE.png README.md
     from fsiwork.dataset import open_run
 
     with open_run(sys.argv[1]) as run:
         print(style.save(membrane(run), sys.argv[2]))
+    put_costs(Path(sys.argv[3]), Plan())
