@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.timing import load
+from fsiwork.provenance import machine
 
 BEGIN, END = "<!-- benchmarks -->", "<!-- /benchmarks -->"
 Row = dict[str, Any]
@@ -43,6 +44,7 @@ def row(
         "pass": reached if reached is None else reached and besides,
         "bandwidth_share": _tidy(share),
         "load": load(),
+        "machine": machine(),
         "note": note,
     }
 
@@ -90,7 +92,18 @@ def table(found: list[Row]) -> str:
         measured = "–" if r["measured"] is None else f"{_show(r['measured'])} {r['unit']}"
         cells = (f"`{r['benchmark']}`", measured, r["mark"], peer, _show(r["ratio"]), share, words)
         lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join(lines) + "\n"
+    return "\n".join((*lines, "", _legend(found))) + "\n"
+
+
+def _legend(found: list[Row]) -> str:
+    machines = " and ".join(sorted({r["machine"] for r in found}))
+    loads = [r["load"] for r in found] or [0.0]
+    busy = f"{min(loads):.1f} to {max(loads):.1f}"
+    return (
+        f"Least CPU time of many, one thread, {machines}; {busy} processes a core wanted to run at the time."
+        " *Bandwidth*: what a triad a = b + s c over arrays of the same size, in the same run, would allow if each field"
+        " that a stage needs were read once and each that it changes written once."
+    )
 
 
 def _show(x: float | None) -> str:
