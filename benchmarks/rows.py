@@ -101,8 +101,8 @@ def _legend(found: list[Row]) -> str:
     busy = f"{min(loads):.1f} to {max(loads):.1f}"
     return (
         f"Least CPU time of many, one thread, {machines}; {busy} processes a core wanted to run at the time."
-        " *Bandwidth*: what a triad a = b + s c over arrays of the same size, in the same run, would allow if each field"
-        " that a stage needs were read once and each that it changes written once."
+        " *Bandwidth*: what a triad a = b + s c over arrays of the same size, in the same run, would allow if each"
+        " field that a stage needs were read once and each that it changes written once."
     )
 
 
