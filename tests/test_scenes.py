@@ -185,3 +185,47 @@ def test_a_pressure_that_misses_its_tolerance_ends_the_run(monkeypatch):
     monkeypatch.setattr(multigrid.Variable, "solve", never)
     *_, last = frames(small("rising_drop"))
     assert last.ended.startswith("diverged at t=0 (step 0): pressure: residual 3e-4 after 100 iterations")
+
+
+@pytest.mark.parametrize("coupling", COUPLINGS)
+def test_a_scene_turned_by_a_right_angle_gives_the_same_run_turned(coupling):
+    """The pressure is solved by lines along x and transforms along y: to rounding no direction is preferred."""
+    found = []
+    for axes in ([0.75, 0.5], [0.5, 0.75]):
+        shape = {"kind": "ellipse", "centre": [1.0, 1.0], "semi_axes": axes}
+        found.append(run(small("elliptic_membrane", 20, bodies__0__shape=shape, bodies__0__coupling=coupling)))
+    (one, lying), (other, standing) = found
+    u, v = one.flow.grid.inside(one.flow.u[0], face=0), other.flow.grid.inside(other.flow.u[1], face=1)
+    assert np.abs(u).max() > 0.1
+    assert np.abs(u - v.T).max() < 1e-12
+    phi = one.flow.grid.inside(one.bodies[0].phi)
+    assert np.abs(phi - other.flow.grid.inside(other.bodies[0].phi).T).max() < 1e-12
+    assert np.abs(phi - phi[::-1]).max() < 1e-12  # mirrored in both directions, as the scene is
+    assert np.abs(phi - phi[:, ::-1]).max() < 1e-12
+    assert np.abs(lying["axis_x"] - standing["axis_y"]).max() < 1e-12
+
+
+@pytest.mark.parametrize(("density", "viscosity"), [(1e-3, 1e-5), (1e3, 1.0), (1.0, 10.0), (10.0, 1e-5)])
+def test_fluids_may_differ_a_thousandfold(density, viscosity):
+    """A drop goes the way of its weight; its volume is kept, and Δt is that of the scene."""
+    inside = {"density": density, "viscosity": viscosity}
+    sim, gauges = run(small("rising_drop", 40, bodies__0__inside=inside))
+    moved = gauges["centroid_y"][-1] - gauges["centroid_y"][0]
+    assert np.sign(round(moved, 6)) == np.sign(1.0 - density)
+    assert abs(moved) < 1.05 * 0.5 * 0.08**2  # not faster than in free fall, but for the first step
+    assert np.abs(gauges["volume"] / gauges["volume"][0] - 1).max() < 1e-4
+    assert divergence(sim.flow) < 1e-6
+
+
+@pytest.mark.parametrize("carry", ["field", "map"])
+def test_a_drop_goes_down_a_channel_from_inflow_to_outflow(carry):
+    inlet = {"kind": "inflow", "velocity": [1.0, 0.0], "profile": "parabolic"}
+    sides = {"x": [inlet, "outflow"], "y": "no-slip"}
+    changes = {"box__edges": sides, "fluid__initial": "rest", "clock__end": 0.5, "fluid__viscosity": 0.02}
+    body = {"kind": "membrane", "shape": {"kind": "disc", "centre": [0.5, 0.5], "radius": 0.2}, "width": {"cells": 1.5}}
+    body |= {"energy": {"kind": "linear", "stiffness": 0.25}, "transport": {"carry": carry}}
+    sim, gauges = run(small("two_drops", 100, bodies=[body], **changes))
+    assert 0.3 < gauges["centroid_x"][-1] - gauges["centroid_x"][0] < 0.5  # mean velocity 2/3, peak 1
+    assert np.abs(gauges["centroid_y"] - 0.5).max() < 1e-10
+    assert np.abs(gauges["volume"] / gauges["volume"][0] - 1).max() < 1e-2
+    assert divergence(sim.flow) < 1e-10

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from fsiwork import simulate
+from fsiwork.core import levelset
 from fsiwork.scene import load
 from fsiwork.simulate import build, frames
 
@@ -213,3 +214,13 @@ def _largest_allocation(action) -> int:
         return tracemalloc.get_traced_memory()[1] - before
     finally:
         tracemalloc.stop()
+
+
+def test_density_and_viscosity_of_a_frame_belong_to_its_interface():
+    made = scene("rising_drop", clock__end=0.5, clock__step=0.05, bodies__0__width={"cells": 2})
+    for frame in frames(made):
+        phi, rho, mu = (frame.fields[name][1] for name in ("phi", "rho", "mu"))
+        ramp = levelset.heaviside(phi.ravel(), 2 * made.box.h).reshape(phi.shape)
+        assert np.abs(rho - (0.1 + 0.9 * ramp)).max() < 1e-12
+        assert np.abs(mu - (0.001 + 0.009 * ramp)).max() < 1e-13
+    assert frame.gauges["centroid_y"][-1] > 0.5 + 0.5 * made.box.h  # it has moved, so that it matters when
