@@ -63,7 +63,7 @@ def along(spline: RectBivariateSpline, axis: str, centre: tuple[float, float], r
 
 
 def crossing(phi: RectBivariateSpline, axis: str, centre: tuple[float, float], end: float) -> float:
-    """Coordinate of the first zero of φ outwards from ``centre``; raises ValueError when there is none before ``end``."""
+    """Coordinate of the first zero of φ outwards from ``centre``; raises ValueError if none is before ``end``."""
     r = np.linspace(centre[ALONG[axis]], end, 2001)
     values = along(phi, axis, centre, r)
     if values[0] >= 0 or not (values > 0).any():
