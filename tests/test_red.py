@@ -36,8 +36,8 @@ SMALL = {
             "coarse": {"set": {"box.cells": 16}, "axes": {"clock.step": [0.1, 0.05, 0.025]}},
         },
     },
-    "mode_drop": {
-        "mode_drop": {"coarse": {"set": {"box.cells": 64, "clock.step": 0.005, "bodies.0.width": {"cells": 1.5}}}},
+    "fig_3_11": {
+        "membrane_large_step": {"coarse": {"set": {"clock.end": 4.0}, "axes": {"box.cells": [64]}}},
     },
 }
 
@@ -47,7 +47,7 @@ FLIPS = [
     ("stability_1_54", "core.kernels.membrane.pull_balanced", "q[i] -= 0.5", "q[i] += 0.5", "drop_ratio_min"),
     ("taylor_green", "core.kernels.flow.momentum_central_2d", "- adv * (", "+ adv * (", "order_space_p"),
     ("taylor_green", "core.kernels.flow.momentum_central_2d", "- dp * (", "+ dp * (", "order_time_u"),
-    ("mode_drop", "core.kernels.membrane.pull_balanced", "q[i] -= 0.5", "q[i] += 0.5", "omega"),
+    ("fig_3_11", "core.kernels.membrane.add_normal", "q[i] += k", "q[i] -= k", "axis_error"),
 ]  # fmt: skip
 
 
