@@ -1,7 +1,8 @@
 """Incompressible Navier-Stokes on the staggered grid: predict, project; second order in space and time.
 
 AB2 for advection, Crank-Nicolson for diffusion, incremental pressure with the rotational correction. What a body may
-change between `begin` and `predict` are the slots ``rho``, ``mu``, ``force`` and ``stiffness``.
+change between `begin` and `predict` are the slots ``rho``, ``mu``, ``force`` and ``stiffness``. With variable ρ or μ
+`core.mixture` does diffusion (backward Euler then, unless explicit) and, if ρ varies, the projection.
 """
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from fsiwork.core.edges import Edges
 from fsiwork.core.grid import GHOSTS, Grid
 from fsiwork.core.kernels import flow as kernels
-from fsiwork.core.multigrid import Variable
+from fsiwork.core.mixture import Mixture
 from fsiwork.core.poisson import Direct, Lines
 
 LINES_UP_TO = 4.0  # α/Δx² up to which the line factorisation serves (MEASURED-poisson 2); beyond it the exact solve
@@ -48,6 +49,7 @@ class Flow:
         self._psi, self._minus_div = np.zeros(grid.n), np.zeros(grid.n)
         self._force = None
         self._mixture: dict[str, np.ndarray] = {}
+        self._mixed: Mixture | None = None
         self._solvers: dict = {}
         self._rows = [self._unknowns(c) for c in grid.axes]
         kernel = "central" if advection == "none" else advection
@@ -73,6 +75,10 @@ class Flow:
         """μ as a flat centre field, whether constant or not."""
         return self._uniform("mu") if self.mu is None else self.mu
 
+    def density_field(self) -> np.ndarray:
+        """ρ as a flat centre field, whether constant or not."""
+        return self._uniform("rho") if self.rho is None else self.rho
+
     def _uniform(self, name: str) -> np.ndarray:
         q = self._mixture.get(name)
         if q is None:
@@ -90,17 +96,20 @@ class Flow:
 
     def predict(self, dt: float) -> None:
         """u* of (3.63) without the new pressure: advection and forces at n, diffusion in increment form."""
-        if self.rho is not None or self.mu is not None:
-            kappa = self._prepare_mixture(dt)
-        else:
-            kappa = self.theta * dt * self.viscosity / self.density
-        kappa += self.stiffness * dt**2
         self.dt = dt
+        constant = self.rho is None and self.mu is None
+        if not constant:
+            self._mixed = self._mixed or Mixture(self.grid, self.edges)
+            self._mixed.prepare(self)
+        kappa = self.theta * dt * self.viscosity / self.density + self.stiffness * dt**2
+        implicit = kappa > 0.0 or (self.theta > 0.0 and not constant)
         for c in self.grid.axes:
-            self._explicit_part(c, dt, increment=kappa > 0.0)
-        for c in self.grid.axes:
-            if kappa > 0.0:
+            self._explicit_part(c, dt, increment=implicit)
+        for c in self.grid.axes if implicit else ():
+            if constant:
                 self._implicit_part(c, kappa)
+            else:
+                self._mixed.increment(self, c, self._star[c])
         self.u, self._star = self._star, self.u
         self.edges.fill_velocity(self.u)
         self.dt_old, self._kappa = dt, kappa
@@ -111,9 +120,14 @@ class Flow:
         start, n = g.rows()
         self._divergence(self._minus_div.reshape(-1), *self.u, start, n, *g.strides, 1.0 / (g.h * dt))
         if self.rho is None:
-            self._project_constant(dt)
+            psi, weight = self._project_constant(dt), self.density
         else:
-            self._project_variable(dt)
+            psi, weight = self._mixed.project(self.u, self._minus_div, self._psi, dt), 1.0
+        if self.rho is None and self.mu is None:
+            rows, gain = (psi.reshape(-1), self._minus_div.reshape(-1)), self._kappa * self.density
+            kernels.update_pressure(self.p, self.before, *rows, start, n, weight, gain)
+        else:
+            self._mixed.update_pressure(self, psi, self._minus_div, weight)
         self.edges.fill_pressure(self.p)
         self.edges.fill_velocity(self.u, outflow=False)
 
@@ -181,54 +195,12 @@ class Flow:
             d = self._solver("exact", c, shape).solve(d, 1.0, kappa)
         kernels.scatter_sum(self._star[c], self.u[c], d.reshape(-1), start, n)
 
-    def _project_constant(self, dt: float) -> None:
-        g = self.grid
-        start, n = g.rows()
+    def _project_constant(self, dt: float) -> np.ndarray:
         np.copyto(self._psi, self._minus_div)
         psi = self._solver("pressure").solve(self._psi)
-        flat = psi.reshape(-1)
-        for c in g.axes:
-            self._correct(c, flat, dt / g.h)
-        gain = self._kappa * self.density
-        kernels.update_pressure(self.p, self.before, flat, self._minus_div.reshape(-1), start, n, self.density, gain)
-
-    def _project_variable(self, dt: float) -> None:
-        """ψ keeps the last increment as its first guess; the coefficient is 1/ρ on the faces."""
-        g = self.grid
-        start, n = g.rows()
-        solver = self._solver("variable")
-        faces = [g.inside(self._beta[c], face=c) for c in g.axes]
-        psi = solver.solve(faces, self._minus_div, self._psi)
-        self._psi[...] = psi
-        q = self._mixture.get("psi")
-        if q is None:
-            q = self._mixture["psi"] = g.field()
-        g.inside(q)[...] = psi
-        self.edges.fill_pressure(q)
-        wide, m = g.rows(0, 1)
-        for c in g.axes:
-            kernels.correct_weighted(self.u[c], q, self._beta[c], wide, m, g.strides[c], dt / g.h)
-        kernels.update_pressure(self.p, self.before, psi.reshape(-1), self._minus_div.reshape(-1), start, n, 1.0, 0.0)
-
-    def _prepare_mixture(self, dt: float) -> float:
-        """Turn force, viscosity and pressure into an acceleration on the faces; return κ = ν_max Δt."""
-        g, force = self.grid, self.force
-        rho = self._uniform("rho") if self.rho is None else self.rho
-        mu = self.viscosity_field()
-        start, n = g.rows()
-        wide, m = g.rows(0, 1)
-        if not hasattr(self, "_beta"):
-            self._beta = [g.field() for _ in g.axes]
-        for c in g.axes:
-            kernels.inverse_density(self._beta[c], rho, wide, m, g.strides[c])
-            kernels.add_viscous_normal(force[c], self.u[c], mu, start, n, g.strides[c], g.h**-2)
-            for b in g.axes:
-                if b != c:
-                    sc, sb = g.strides[c], g.strides[b]
-                    kernels.add_viscous_tangential(force[c], self.u[c], self.u[b], mu, start, n, sc, sb, g.h**-2)
-            kernels.accelerate(force[c], self.p, self._beta[c], start, n, g.strides[c], 1.0 / g.h)
-        np.divide(mu, rho, out=self._star[0])
-        return dt * self.largest(self._star[0]) if self.theta else 0.0
+        for c in self.grid.axes:
+            self._correct(c, psi.reshape(-1), dt / self.grid.h)
+        return psi
 
     def _correct(self, c: int, psi: np.ndarray, factor: float) -> None:
         g = self.grid
@@ -287,7 +259,6 @@ class Flow:
             g, e = self.grid, self.edges
             make = {
                 "pressure": lambda: Direct(g.n, g.h, e.ends_pressure()),
-                "variable": lambda: Variable(g.n, g.h, e.ends_pressure()),
                 "exact": lambda: Direct(shape, g.h, e.ends_velocity(c)),
                 "lines": lambda: Lines(shape, g.h, e.ends_velocity(c)),
             }

@@ -1,4 +1,4 @@
-"""Pressure with variable density: multigrid-preconditioned conjugate gradients."""
+"""Pressure and viscous increments with variable coefficients: multigrid-preconditioned conjugate gradients."""
 
 from collections.abc import Sequence
 from itertools import product
@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 
 from fsiwork.core.ends import Ends, check_ends, is_singular
-from fsiwork.core.kernels.multigrid import D, Q, R, conjugate_gradients, relaxation
+from fsiwork.core.kernels.multigrid import DIAGONAL, D, Q, R, conjugate_gradients, relaxation
 
 END_FACES = {"neumann": 0.0, "dirichlet": 2.0, "node": 1.0}  # flux out of an end face = this × β q/h
 SMALL = 3  # an axis with so few cells is not merged any more
@@ -65,10 +65,11 @@ def merged(k: int) -> int:
 
 
 class Variable:
-    """−div(β grad q) = f at cell centres with second-order face fluxes, by conjugate gradients and a V(1,1) cycle.
+    """d q − div(β grad q) = f at cell centres with second-order face fluxes, by conjugate gradients and a V(1,1) cycle.
 
     Cells are merged in pairs (an odd last one stays alone, so any ``n`` works), the coefficients of faces between
-    merged cells are summed, corrections carried back piecewise constant: robust to jumps of β by 1000 and more.
+    merged cells and the d of merged cells are summed, corrections carried back piecewise constant: robust to jumps of
+    d and β by 1000 and more. "Cells" are any unknowns on a uniform grid, such as one component's faces.
 
     Parameters
     ----------
@@ -77,12 +78,23 @@ class Variable:
     ends : as in `fsiwork.core.poisson.Direct`, of "periodic", "neumann", "dirichlet" and "node"
     rtol : tolerance of |f − A q| / |f| (2-norm)
     most : iterations after which it gives up
+    diagonal : whether there is a d (with one, nothing is singular)
+    name : of what is solved for, in the text of `NotConverged`
 
     Raises ValueError for ends or a number of axes it has no stencil for. ``iterations`` and ``residual`` (relative)
     tell about the last solve. Everything is float64.
     """
 
-    def __init__(self, n: Sequence[int], h: float, ends: Ends, rtol: float = 1e-10, most: int = 200):
+    def __init__(
+        self,
+        n: Sequence[int],
+        h: float,
+        ends: Ends,
+        rtol: float = 1e-10,
+        most: int = 200,
+        diagonal: bool = False,
+        name: str = "pressure",
+    ):
         self.n = tuple(int(k) for k in n)
         if len(self.n) not in (2, 3):
             raise ValueError(f"two or three axes are needed, got {len(self.n)}")
@@ -90,10 +102,10 @@ class Variable:
         self.ends = check_ends(self.n, ends)
         if any("node-neumann" in pair for pair in self.ends):
             raise ValueError(f"a variable coefficient has no stencil for node-neumann ends, got {self.ends}")
-        self.rtol, self.most = float(rtol), int(most)
+        self.rtol, self.most, self.diagonal, self.name = float(rtol), int(most), bool(diagonal), name
         self.iterations, self.residual = 0, 0.0
         self._periodic = [pair[0] == "periodic" for pair in self.ends]
-        self._singular = is_singular(self.ends)
+        self._singular = is_singular(self.ends) and not self.diagonal
         self._plan()
 
     def _plan(self) -> None:
@@ -103,7 +115,7 @@ class Variable:
             levels.append(Level(tuple(merged(k) for k in levels[-1].n), levels[-1].offset + levels[-1].size))
         size = levels[-1].offset + levels[-1].size
         self._grids = levels
-        self._fields, self._c = np.zeros((7, size)), np.zeros((3, size))
+        self._fields, self._c = np.zeros((7, size)), np.zeros((3 + self.diagonal, size))
         table, starts, children, pairs = [], [], [], []
         first = known = 0
         for k, level in enumerate(levels):
@@ -130,9 +142,11 @@ class Variable:
             found[:, k] = np.where(inside, fine.start(rows), -1)
         return found
 
-    def _coefficients(self, beta: Sequence[np.ndarray]) -> np.ndarray:
-        """Faces of every level, Jacobi factors, and the dense inverse of the coarsest level."""
+    def _coefficients(self, beta: Sequence[np.ndarray], diagonal: np.ndarray | None) -> np.ndarray:
+        """Faces and d h² of every level, Jacobi factors, and the dense inverse of the coarsest level."""
         finest = self._grids[0]
+        if self.diagonal:
+            np.multiply(diagonal, self.h**2, out=finest.cells(self._c[DIAGONAL]))
         for a, (low, high) in enumerate(self.ends):
             faces = finest.faces(self._c, a)
             faces[...] = beta[a]
@@ -145,6 +159,8 @@ class Variable:
         for fine, coarse in zip(self._grids, self._grids[1:], strict=False):
             for a in range(len(self.n)):
                 _merge_faces(coarse.faces(self._c, a), fine.faces(self._c, a), a)
+            if self.diagonal:
+                _merge_cells(coarse.cells(self._c[DIAGONAL]), fine.cells(self._c[DIAGONAL]))
         for first, rows, n, s, t, *_ in self._levels:
             relaxation(self._fields[D], self._c, self._starts[first : first + rows], n, s, t, DAMPING)
         return self._dense_inverse()
@@ -153,6 +169,8 @@ class Variable:
         level = self._grids[-1]
         number = np.arange(np.prod(level.n)).reshape(level.n)
         matrix = np.zeros((number.size, number.size))
+        if self.diagonal:
+            matrix += np.diag(level.cells(self._c[DIAGONAL]).ravel())
         for a in range(len(self.n)):
             line, face = np.moveaxis(number, a, 0), np.moveaxis(level.faces(self._c, a), a, 0)
             np.add.at(matrix, (line, line), face[:-1] + face[1:])
@@ -165,19 +183,27 @@ class Variable:
             matrix += matrix.trace() / number.size**2
         return np.linalg.inv(matrix)
 
-    def solve(self, beta: Sequence[np.ndarray], f: np.ndarray, q0: np.ndarray | None = None) -> np.ndarray:
+    def solve(
+        self,
+        beta: Sequence[np.ndarray],
+        f: np.ndarray,
+        q0: np.ndarray | None = None,
+        diagonal: np.ndarray | None = None,
+    ) -> np.ndarray:
         """q at cell centres, shape ``n``; the array belongs to the solver and is overwritten by the next solve.
 
         ``beta``: one array an axis, on all faces of that axis (n_a + 1 along a; both end faces are the same one when
         periodic; faces of Neumann ends are not used), positive. ``f``: shape ``n``. ``q0``: first guess (dropped
-        when worse than zero).
+        when worse than zero). ``diagonal``: d ≥ 0, not everywhere zero, shape ``n``; given if and only if announced.
         With Neumann and periodic ends only, the mean of f is dropped and q has mean zero.
         Raises ValueError for wrong shapes, `NotConverged` when ``rtol`` is missed after ``most`` iterations.
         """
         wanted = [tuple(k + (a == b) for b, k in enumerate(self.n)) for a in range(len(self.n))]
         if [np.shape(b) for b in beta] != wanted or np.shape(f) != self.n:
             raise ValueError(f"faces {wanted} and cells {self.n} are needed, got {[b.shape for b in beta]}, {f.shape}")
-        inverse = self._coefficients(beta)
+        if (diagonal is not None) != self.diagonal or (self.diagonal and diagonal.shape != self.n):
+            raise ValueError(f"a diagonal of shape {self.n} is needed if and only if it was announced")
+        inverse = self._coefficients(beta, diagonal)
         q, r = (self._grids[0].cells(self._fields[k]) for k in (Q, R))
         q[...] = 0.0 if q0 is None else q0
         np.multiply(f, self.h**2, out=r)
@@ -201,7 +227,7 @@ class Variable:
         self.residual = left / size if size > 0 else left
         if not left <= self.rtol * size:
             raise NotConverged(
-                f"pressure: relative residual {self.residual:.1e} after {self.iterations} iterations,"
+                f"{self.name}: relative residual {self.residual:.1e} after {self.iterations} iterations,"
                 f" wanted {self.rtol:.1e}"
             )
         self._q[...] = q
@@ -225,3 +251,12 @@ def _merge_faces(coarse: np.ndarray, fine: np.ndarray, a: int) -> None:
         into[m] += line[n]
     if m < n:
         coarse *= STRETCH
+
+
+def _merge_cells(coarse: np.ndarray, fine: np.ndarray) -> None:
+    """Zero-order coefficients of merged cells: sums over the fine cells."""
+    coarse[...] = 0
+    two = [fine.shape[a] > coarse.shape[a] for a in range(fine.ndim)]
+    for step in product(*((0, 1) if yes else (0,) for yes in two)):
+        part = fine[tuple(slice(d, None, 1 + yes) for d, yes in zip(step, two, strict=True))]
+        coarse[tuple(slice(0, k) for k in part.shape)] += part

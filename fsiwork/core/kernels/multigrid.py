@@ -1,8 +1,9 @@
-"""Conjugate gradients with a multigrid cycle, for −div(β grad q) on cells that are merged in pairs.
+"""Conjugate gradients with a multigrid cycle, for d q − div(β grad q) on cells that are merged in pairs.
 
 All levels of a quantity lie behind each other in one flat buffer, each padded by one ghost layer; ``start`` are places
 in that buffer. Face coefficients ``c``, shape (3, size), sit on the low face of their cell: c[0] for the contiguous
 direction, c[1] for the one ``s`` apart, c[2] for the one ``t`` apart; in two dimensions t = 0 and c[2] is not read.
+A fourth row, if there is one, is the diagonal coefficient d h² at centres.
 Ghosts of a field stay zero, or hold the other side of a periodic box.
 
 A row of ``levels`` is (first row, rows, n, s, t, first pair of ghosts, pairs).
@@ -16,6 +17,16 @@ from fsiwork.core.kernels import FASTMATH, loop
 serial = njit(error_model="numpy", fastmath=FASTMATH, cache=True)
 
 Q, R, P, AP, Z, W, D = range(7)  # rows of ``fields``: solution, residual, direction, A times it, cycle (two), Jacobi
+DIAGONAL = 3  # row of ``c`` with the zero-order coefficient
+
+
+@serial
+def weigh(o, p, c, I, n):
+    """Add the zero-order part d q of a row, if there is one."""
+    if c.shape[0] > DIAGONAL:
+        d = c[DIAGONAL, I : I + n]
+        for i in range(n):
+            o[i] += d[i] * p[i]
 
 
 @serial
@@ -28,23 +39,27 @@ def balance(out, q, c, I, n, s, t):
     if t == 0:
         for i in range(n):
             o[i] = cw[i] * (p[i] - w[i]) + ce[i] * (p[i] - e[i]) + cf[i] * (p[i] - f[i]) + cg[i] * (p[i] - g[i])
+        weigh(o, p, c, I, n)
         return
     u, v = q[I - t : I - t + n], q[I + t : I + t + n]
     cu, cv = c[2, I : I + n], c[2, I + t : I + t + n]
     for i in range(n):
         xy = cw[i] * (p[i] - w[i]) + ce[i] * (p[i] - e[i]) + cf[i] * (p[i] - f[i]) + cg[i] * (p[i] - g[i])
         o[i] = xy + cu[i] * (p[i] - u[i]) + cv[i] * (p[i] - v[i])
+    weigh(o, p, c, I, n)
 
 
 @loop
 def relaxation(d, c, start, n, s, t, factor):
-    """d = factor / diagonal of A; 0 for a cell without any open face."""
+    """d = factor / diagonal of A; 0 for a cell where it is nothing."""
     for r in prange(start.size):
         I = start[r]
         for i in range(I, I + n):
             total = c[0, i] + c[0, i + 1] + c[1, i] + c[1, i + s]
             if t > 0:
                 total += c[2, i] + c[2, i + t]
+            if c.shape[0] > DIAGONAL:
+                total += c[DIAGONAL, i]
             d[i] = factor / total if total > 0 else 0.0
 
 
