@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from fsiwork.figures import style
 from fsiwork.studies import membranes, pressure
@@ -27,7 +28,7 @@ def _half_axes(ax, data: xr.Dataset, label: str, look: dict, marks: int = 0, **p
 
 # ------------------------------------------------------------------------------------------------------- the drop
 def fig_3_9(datasets: Datasets, measured: Measured) -> Figure:
-    """Half-axes of the drop with the semi-implicit (left) and the explicit scheme (right), and where the latter ends."""
+    """Half-axes of the drop with the semi-implicit (left) and the explicit scheme (right), and its limit."""
     runs = datasets["drop_schemes"]
     figure, (left, right) = style.sheet(1, 2, size=(8.6, 3.3), sharey=True)
     for ax, coupling, word in ((left, "semi-implicit", "stable"), (right, "explicit", "unstable")):
@@ -36,7 +37,7 @@ def fig_3_9(datasets: Datasets, measured: Measured) -> Figure:
             ax.plot(t, q, "-" if k == 0 else "--", color=style.OKABE_ITO[k], label=AXIS[gauge])
         ax.set(xlabel=TIME, title=f"{coupling}: {word}", ylim=(0.45, 0.85))
         style.band(ax, membranes.RADIUS)
-    right.set_xlim(0, max(0.3, 1.3 * float(history(runs, "axis_x", coupling="explicit")[0][-1])))
+    right.set_xlim(0, 1.9 * float(history(runs, "axis_x", coupling="explicit")[0][-1]))
     right.axvline(measured["explicit_from"], color="0", linewidth=0.8)
     right.annotate(
         f"past the bounds at t = {measured['explicit_from']:.3g}",
@@ -49,7 +50,7 @@ def fig_3_9(datasets: Datasets, measured: Measured) -> Figure:
         f"  ratio      {measured['limit_over_1_54']:.2f}",
         "here Δt = 0.00250",
     )
-    right.text(0.03, 0.05, "\n".join(lines), transform=right.transAxes, fontsize=8, va="bottom")
+    right.text(0.6, 0.04, "\n".join(lines), transform=right.transAxes, fontsize=8, va="bottom")
     left.set_ylabel(AXES)
     left.legend(loc="upper right", ncols=2)
     style.note(figure, datasets, "grey: circle of the same area")
@@ -61,10 +62,12 @@ def fig_3_10(datasets: Datasets, measured: Measured) -> Figure:
     runs = datasets["drop_refinement"]
     cells = sorted(int(n) for n in runs["cells"].values)
     figure, (left, right) = style.sheet(1, 2, size=(8.6, 3.4))
-    for n, look in zip(cells[-2:], ({"marker": "x", "linestyle": "none"}, {"linestyle": "-"}), strict=True):
+    for n, look in zip(
+        cells[-2:], ({"marker": "x", "markersize": 3.5, "linestyle": "none"}, {"linestyle": "-"}), strict=True
+    ):
         for k, (gauge, word) in enumerate(AXIS.items()):
             t, q = history(runs, gauge, cells=n)
-            step = max(1, t.size // 60) if "marker" in look else 1
+            step = max(1, t.size // 130) if "marker" in look else 1
             left.plot(t[::step], q[::step], color=style.OKABE_ITO[k], label=f"{word}, N = {n}", **look)
     style.band(left, membranes.RADIUS)
     left.set(xlabel=TIME, ylabel=AXES, ylim=(0.48, 0.86), title="Axes on the two finest grids")
@@ -75,11 +78,12 @@ def fig_3_10(datasets: Datasets, measured: Measured) -> Figure:
         step = max(1, t.size // 400)
         right.plot(t[1::step], np.maximum(deviation[1::step], 1e-6), color=colour, linewidth=1.1)
         worst = measured[f"volume_deviation_{n}"]
-        right.annotate(f"N = {n}: {worst:.2g} %", (t[-1], deviation[-1]), (-4, 3), color=colour,
-                       textcoords="offset points", fontsize=8, ha="right")  # fmt: skip
+        place, side = ((-4, -3), "top") if n == cells[-1] else ((-4, 3), "bottom")
+        right.annotate(f"N = {n}: {worst:.2g} %", (t[-1], deviation[-1]), place, color=colour,
+                       textcoords="offset points", fontsize=8, ha="right", va=side)  # fmt: skip
     for percent, n in ((1.5, 64), (0.1, 512)):
         right.axhline(percent, **style.REFERENCE)
-        right.text(0.02, percent, f"book, N = {n}: {percent:g} %", fontsize=8, va="bottom", color="0.3",
+        right.text(0.4, percent, f"book, N = {n}: {percent:g} %", fontsize=8, va="bottom", color="0.3",
                    transform=right.get_yaxis_transform())  # fmt: skip
     right.set(yscale="log", ylim=(1e-4, 5), xlabel=TIME, ylabel="|volume / first volume − 1| [%]")
     right.set_title("Volume: largest deviation by grid")
@@ -140,7 +144,7 @@ def fig_3_11(datasets: Datasets, measured: Measured) -> Figure:
 def fig_3_12(datasets: Datasets, measured: Measured) -> Figure:
     """Half-axes of the three schemes at the book's steps, N = 128 and 256, ε = 3 Δx (above) and 6 Δx."""
     runs = datasets["membrane_schemes"]
-    figure, panels = style.sheet(2, 2, size=(9.0, 6.2), sharex=True, sharey=True)
+    figure, panels = style.sheet(2, 2, size=(7.8, 5.2), sharex=True, sharey=True)
     for row, width in zip(panels, sorted(runs["width"].values), strict=True):
         tail = "" if width == membranes.NARROW else f"_width_{width:g}"
         for ax, n in zip(row, (128, 256), strict=True):
@@ -148,11 +152,12 @@ def fig_3_12(datasets: Datasets, measured: Measured) -> Figure:
                 case = f"{coupling.replace('-', '_')}_{n}"
                 dt = float(runs["dt"].sel(case=case, width=width).max())
                 look = {**style.COUPLING[coupling], "markersize": 4}
-                _half_axes(ax, runs, f"{coupling}, Δt = {dt:.2g}", look, 25, case=case, width=width)
+                _half_axes(ax, runs, f"{coupling}, Δt = {dt:.2g}", look, 12, case=case, width=width)
             style.band(ax, membranes.RADIUS, 0.005 * membranes.RADIUS)
             book, own = (measured[f"{name}_difference_{n}{tail}"] for name in ("amplitude", "stabilised"))
             ax.set(title=f"N = {n}, ε = {width:g} Δx", ylim=(0.48, 0.86))
-            words = f"first minimum against the explicit scheme,\n% of amplitude: {book:.2g} semi-implicit, {own:.2g} stabilised"
+            words = "first minimum against the explicit scheme,\n% of amplitude: "
+            words += f"{book:.2g} semi-implicit, {own:.2g} stabilised"
             ax.text(0.98, 0.03, words, transform=ax.transAxes, fontsize=8, ha="right")
             ax.legend(loc="upper right")
     for ax in panels[-1]:
@@ -176,12 +181,13 @@ def fig_3_13(datasets: Datasets, measured: Measured) -> Figure:
     ax.axvline(1, color="w", linewidth=0.6, linestyle=":")
     ax.grid(visible=False)
     ax.set(xlabel="x [length]", ylabel="y [length]", aspect="equal", title="λ = 1, Re = 100, ε = 0.1, t = 0.4")
-    figure.colorbar(filled, label="p [mass / (length · time²)], mean zero", shrink=0.9, format="%.2f")
-    for axis, place in (("x", (1.99, 1.03)), ("y", (1.03, 1.93))):
-        ratio = measured[f"jump_over_balance_{axis}"]
-        words = f"jump {measured[f'jump_{axis}']:.3f}\n= {ratio:.3f} × balance"
-        ax.text(*place, words, color="w", fontsize=7, ha="right" if axis == "x" else "left",
-                va="bottom" if axis == "x" else "top")  # fmt: skip
+    figure.colorbar(filled, label="p [mass / (length · time²)], mean zero", shrink=0.9, ticks=MaxNLocator(7))
+    words = [
+        f"{line}: jump {measured[f'jump_{axis}']:.4f}, {measured[f'jump_over_balance_{axis}']:.3f} of the local balance"
+        for axis, line in (("x", "y = 1"), ("y", "x = 1"))
+    ]
+    ax.text(0.02, 0.02, "\n".join(words), color="w", fontsize=8, transform=ax.transAxes)
+    ax.set(xlim=(0, 2), ylim=(0, 2), facecolor=style.SEQUENTIAL(0.3))
     style.note(figure, datasets, "white: interface")
     return figure
 
@@ -206,9 +212,9 @@ def fig_3_14(datasets: Datasets, measured: Measured) -> Figure:
         words = f"jump {line.jump:.4f}\nE'H − [2μ n·Dn] = {line.balance:.4f}\nratio {line.jump / line.balance:.3f}"
         if t > 1:
             words += f"\nexact at rest 0.367007 λ ({100 * (measured['rest_jump'] / 0.367007 - 1):+.2f} %)"
-        ax.text(0.36, 0.3, words, transform=ax.transAxes, fontsize=8)
+        ax.text(0.27, 0.3, words, transform=ax.transAxes, fontsize=8)
         ax.set(xlabel="x [length], y = 1", title=title)
     panels[0].set_ylabel("p [mass / (length · time²)]")
-    panels[1].legend(loc="upper left", bbox_to_anchor=(0.1, 0.62))
+    panels[0].legend(loc="upper left", bbox_to_anchor=(0.24, 0.75))
     style.note(figure, datasets, "λ = 1, Re = 100, ε = 0.1")
     return figure
