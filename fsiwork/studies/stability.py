@@ -173,7 +173,9 @@ def stays_bounded(scene, dt: float, horizon: float, released: float) -> tuple[bo
 def largest_step(scene, point: dict[str, Any]) -> dict[str, Any]:
     """Largest stable Δt of the real step of a scene with one membrane or drop, to 1 %, by bisection.
 
-    ``point`` may hold ``horizon`` (time that has to be survived, default 1) and ``largest`` (where the search ends).
+    ``point`` may hold ``horizon`` (time that has to be survived, default 1), ``largest`` (where the search ends) and
+    ``least_steps``: an explicit run has to survive that many steps too, for an instability grows with every step, and a
+    few long ones would end before it shows.
     Beside ``limit`` and ``found`` (see `Largest`) it returns (1.54) with λ, with the tension s E'(s) in its place, and
     with that tension for the diffusion that the flow really takes: Crank–Nicolson in one fluid, else backward Euler.
     Raises ValueError for a scene without exactly one body in the plane.
@@ -189,10 +191,11 @@ def largest_step(scene, point: dict[str, Any]) -> dict[str, Any]:
     by_tension = float(step_limit(tension, *numbers)) if tension > 0 else math.nan
     by_scheme = float(step_limit(tension, *numbers, theta=theta)) if tension > 0 else math.nan
     total, released = 0, releasable(scene)
+    least_steps = float(point.get("least_steps", 0)) if body.coupling == "explicit" else 0.0
 
     def stable(dt: float) -> bool:
         nonlocal total
-        good, steps = stays_bounded(scene, dt, float(point.get("horizon", 1.0)), released)
+        good, steps = stays_bounded(scene, dt, max(float(point.get("horizon", 1.0)), least_steps * dt), released)
         total += steps
         return good
 
