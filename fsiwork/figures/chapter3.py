@@ -144,7 +144,7 @@ def fig_3_11(datasets: Datasets, measured: Measured) -> Figure:
 def fig_3_12(datasets: Datasets, measured: Measured) -> Figure:
     """Half-axes of the three schemes at the book's steps, N = 128 and 256, ε = 3 Δx (above) and 6 Δx."""
     runs = datasets["membrane_schemes"]
-    figure, panels = style.sheet(2, 2, size=(7.8, 5.2), sharex=True, sharey=True)
+    figure, panels = style.sheet(2, 2, size=(7.4, 5.0), sharex=True, sharey=True)
     for row, width in zip(panels, sorted(runs["width"].values), strict=True):
         tail = "" if width == membranes.NARROW else f"_width_{width:g}"
         for ax, n in zip(row, (128, 256), strict=True):
