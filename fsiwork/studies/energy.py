@@ -5,6 +5,7 @@ a gauge of every run. Totals are its sums over a run, in parts of the excess ene
 """
 
 import math
+from functools import cache
 
 import numpy as np
 import xarray as xr
@@ -20,7 +21,12 @@ def residuals(data: xr.Dataset) -> xr.DataArray:
     if len({_released_by(text) for text in texts}) != 1:
         raise ValueError("the runs of one study must start with the same energy")
     whole = data["energy_residual"].where(data["t_step"].notnull(), 0.0)  # rows that a run does not have
-    return whole.where(data["ended"] == "complete") / releasable(scenes.loads(str(texts[0])))
+    return whole.where(data["ended"] == "complete") / _excess(str(texts[0]))
+
+
+@cache
+def _excess(text: str) -> float:
+    return releasable(scenes.loads(text))
 
 
 def _released_by(text: str) -> str:
