@@ -53,13 +53,20 @@ class Mixture:
         self._pressure: Variable | None = None
 
     def prepare(self, flow) -> None:
-        """Turn force, viscosity and pressure at n into an acceleration on the faces, in ``flow.force``."""
+        """Turn force, viscosity and pressure at n into an acceleration on the faces, in ``flow.force``.
+
+        The first step of a flow without pressure starts from the one that balances the forces, so that layers at
+        rest stay at rest.
+        """
         g, force = self.grid, flow.force
         self.rho, self.mu = flow.density_field(), flow.viscosity_field()
         start, n = g.rows()
         wide, m = g.rows(0, 1)
         for c in g.axes:
             kernels.inverse_density(self.beta[c], self.rho, wide, m, g.strides[c])
+        if not flow.dt_old and not flow.p.any():
+            self._balance(flow)
+        for c in g.axes:
             self._diffuse(force[c], c, self.mu, flow.u, g.h**-2)
             kernels.accelerate(force[c], flow.p, self.beta[c], start, n, g.strides[c], 1.0 / g.h)
 
@@ -86,10 +93,7 @@ class Mixture:
     def project(self, u: list[np.ndarray], minus_div: np.ndarray, psi: np.ndarray, dt: float) -> np.ndarray:
         """u -= Δt ∇ψ/ρ, where -div(∇ψ/ρ) = ``minus_div`` = -div u*/Δt; ψ (compact) is the first guess, too."""
         g = self.grid
-        if self._pressure is None:
-            self._pressure = Variable(g.n, g.h, self.edges.ends_pressure())
-        faces = [g.inside(self.beta[c], face=c) for c in g.axes]
-        psi[...] = self._pressure.solve(faces, minus_div, psi)
+        psi[...] = self._solve(minus_div, psi)
         g.inside(self._psi)[...] = psi
         self.edges.fill_pressure(self._psi)
         wide, m = g.rows(0, 1)
@@ -109,6 +113,29 @@ class Mixture:
     def _weights(self, flow) -> tuple[float, float]:
         """What μ and ρ are multiplied with in the implicit operator: Δt (0 if diffusion is explicit) and c_s Δt²."""
         return (flow.dt if flow.theta else 0.0), flow.stiffness * flow.dt**2
+
+    def _solve(self, f: np.ndarray, guess: np.ndarray | None) -> np.ndarray:
+        """-div(∇ψ/ρ) = f."""
+        g = self.grid
+        if self._pressure is None:
+            self._pressure = Variable(g.n, g.h, self.edges.ends_pressure())
+        return self._pressure.solve([g.inside(self.beta[c], face=c) for c in g.axes], f, guess)
+
+    def _balance(self, flow) -> None:
+        """p with div(∇p/ρ) = div(f/ρ + gravity) and without flow through the sides."""
+        g, f = self.grid, np.zeros(self.grid.n)
+        for c in g.axes:
+            q = np.moveaxis(g.inside(flow.force[c] * self.beta[c] + flow.gravity[c], face=c), c, 0)
+            for side, end, inner in ((0, 0, 1), (1, -1, -2)):
+                if self.edges.periodic(c):
+                    q[-1] = q[0]
+                else:
+                    q[end] = q[inner] if self.edges.sides[c][side].kind == "outflow" else 0.0
+            f -= np.moveaxis(np.diff(q, axis=0), 0, c) / g.h
+        if f.any():
+            g.inside(flow.p)[...] = self._solve(f, None)
+            self.edges.fill_pressure(flow.p)
+            flow.before[:] = flow.p
 
     def _diffuse(self, out, c, mu, u, factor):
         """out += factor h² (div 2μD(u))_c on the faces of the box."""
