@@ -78,12 +78,13 @@ def fig_3_10(datasets: Datasets, measured: Measured) -> Figure:
         step = max(1, t.size // 400)
         right.plot(t[1::step], np.maximum(deviation[1::step], 1e-6), color=colour, linewidth=1.1)
         worst = measured[f"volume_deviation_{n}"]
-        place, side = ((-4, -3), "top") if n == cells[-1] else ((-4, 3), "bottom")
-        right.annotate(f"N = {n}: {worst:.2g} %", (t[-1], deviation[-1]), place, color=colour,
+        place, side = ((0, -3), "top") if n == cells[-1] else ((0, 3), "bottom")
+        at = int(t.size * (0.99 if cells.index(n) % 2 else 0.68))
+        right.annotate(f"N = {n}: {worst:.2g} %", (t[at], deviation[at]), place, color=colour,
                        textcoords="offset points", fontsize=8, ha="right", va=side)  # fmt: skip
     for percent, n in ((1.5, 64), (0.1, 512)):
         right.axhline(percent, **style.REFERENCE)
-        right.text(0.4, percent, f"book, N = {n}: {percent:g} %", fontsize=8, va="bottom", color="0.3",
+        right.text(0.03, percent, f"book, N = {n}: {percent:g} %", fontsize=8, va="bottom", color="0.3",
                    transform=right.get_yaxis_transform())  # fmt: skip
     right.set(yscale="log", ylim=(1e-4, 5), xlabel=TIME, ylabel="|volume / first volume − 1| [%]")
     right.set_title("Volume: largest deviation by grid")
