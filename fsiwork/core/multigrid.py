@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 
 from fsiwork.core.ends import Ends, check_ends, is_singular
-from fsiwork.core.kernels.multigrid import DIAGONAL, D, Q, R, conjugate_gradients, relaxation
+from fsiwork.core.kernels.multigrid import DIAGONAL, D, Q, R, conjugate_gradients, merge_along, merge_rows, relaxation
 
 END_FACES = {"neumann": 0.0, "dirichlet": 2.0, "node": 1.0}  # flux out of an end face = this × β q/h
 SMALL = 3  # an axis with so few cells is not merged any more
@@ -117,28 +117,37 @@ class Variable:
         self._grids = levels
         self._fields, self._c = np.zeros((7, size)), np.zeros((3 + self.diagonal, size))
         table, starts, children, pairs = [], [], [], []
+        self._face_rows = [[] for _ in levels]  # of each slow direction: where they start, and what they are made of
         first = known = 0
         for k, level in enumerate(levels):
             index = np.indices(level.n[:-1]).reshape(len(self.n) - 1, -1)
             starts.append(level.start(index))
             children.append(self._children(levels[k - 1], level, index) if k else np.full((level.rows, 4), -1))
+            for a in range(len(self.n) - 1) if k else ():
+                faces = np.indices([m + (b == a) for b, m in enumerate(level.n[:-1])]).reshape(len(self.n) - 1, -1)
+                self._face_rows[k].append((level.start(faces), self._children(levels[k - 1], level, faces, a)))
             pairs.append(level.ghosts(self._periodic))
             t = level.strides[0] if len(self.n) == 3 else 0
             table.append((first, level.rows, level.n[-1], level.strides[-2], t, known, len(pairs[-1])))
             first, known = first + level.rows, known + len(pairs[-1])
         self._levels = np.array(table)
-        self._starts, self._children, self._pairs = (np.concatenate(x) for x in (starts, children, pairs))
+        self._starts, self._table, self._pairs = (np.concatenate(x) for x in (starts, children, pairs))
         self._parts = np.zeros(levels[0].rows)
         self._q = np.zeros(self.n)
 
     @staticmethod
-    def _children(fine: Level, coarse: Level, index: np.ndarray) -> np.ndarray:
-        """Starts of the fine rows that make each coarse row, −1 where there is none; shape (rows, 4)."""
+    def _children(fine: Level, coarse: Level, index: np.ndarray, face: int | None = None) -> np.ndarray:
+        """Starts of the fine rows that make each coarse row, −1 where there is none; shape (rows, 4).
+
+        With ``face``, rows of faces of that direction: the fine ones that lie on the coarse ones.
+        """
         found = np.full((index.shape[1], 4), -1)
         two = [fine.n[a] > coarse.n[a] for a in range(len(index))]
-        for k, step in enumerate(product(*((0, 1) if yes else (0,) for yes in two))):
+        for k, step in enumerate(product(*((0, 1) if yes and a != face else (0,) for a, yes in enumerate(two)))):
             rows = [i * (1 + yes) + d for i, yes, d in zip(index, two, step, strict=True)]
-            inside = np.all([i < fine.n[a] for a, i in enumerate(rows)], axis=0)
+            if face is not None:
+                rows[face] = np.minimum(rows[face], fine.n[face])
+            inside = np.all([i < fine.n[a] + (a == face) for a, i in enumerate(rows)], axis=0)
             found[:, k] = np.where(inside, fine.start(rows), -1)
         return found
 
@@ -156,14 +165,24 @@ class Variable:
             else:
                 line[0] *= END_FACES[low]
                 line[-1] *= END_FACES[high]
-        for fine, coarse in zip(self._grids, self._grids[1:], strict=False):
-            for a in range(len(self.n)):
-                _merge_faces(coarse.faces(self._c, a), fine.faces(self._c, a), a)
-            if self.diagonal:
-                _merge_cells(coarse.cells(self._c[DIAGONAL]), fine.cells(self._c[DIAGONAL]))
-        for first, rows, n, s, t, *_ in self._levels:
+        for k, (first, rows, n, s, t, *_) in enumerate(self._levels):
+            if k:
+                self._merge(k)
             relaxation(self._fields[D], self._c, self._starts[first : first + rows], n, s, t, DAMPING)
         return self._dense_inverse()
+
+    def _merge(self, k: int) -> None:
+        """Coefficients of level k: sums over the fine faces between merged cells, × STRETCH where their distance
+        doubled, and over the d of merged cells."""
+        fine, coarse = self._grids[k - 1].n, self._grids[k].n
+        m, n, here = coarse[-1], fine[-1], slice(self._levels[k, 0], self._levels[k, 0] + self._levels[k, 1])
+        factor = [STRETCH if two else 1.0 for two in np.less(coarse, fine)]
+        start, children = self._starts[here], self._table[here]
+        merge_along(self._c[0], start, children, m, n, factor[-1])
+        for a, (faces, parts) in enumerate(self._face_rows[k]):
+            merge_rows(self._c[len(self.n) - 1 - a], faces, parts, m, n, factor[a])
+        if self.diagonal:
+            merge_rows(self._c[DIAGONAL], start, children, m, n, 1.0)
 
     def _dense_inverse(self) -> np.ndarray:
         level = self._grids[-1]
@@ -216,7 +235,7 @@ class Variable:
             self._c,
             self._levels,
             self._starts,
-            self._children,
+            self._table,
             self._pairs,
             inverse,
             self._parts,
@@ -234,29 +253,3 @@ class Variable:
         if self._singular:
             self._q -= self._q.mean()
         return self._q
-
-
-def _merge_faces(coarse: np.ndarray, fine: np.ndarray, a: int) -> None:
-    """Coefficients between merged cells: sums over the fine faces between them, × 1/2 where their distance doubled."""
-    n, m = fine.shape[a] - 1, coarse.shape[a] - 1
-    coarse[...] = 0
-    two = [b != a and fine.shape[b] > coarse.shape[b] for b in range(fine.ndim)]
-    for step in product(*((0, 1) if yes else (0,) for yes in two)):
-        part = fine[tuple(slice(d, None, 1 + yes) for d, yes in zip(step, two, strict=True))]
-        into = np.moveaxis(
-            coarse[tuple(slice(0, k) if b != a else slice(None) for b, k in enumerate(part.shape))], a, 0
-        )
-        line = np.moveaxis(part, a, 0)
-        into[:m] += line[:-1:2] if m < n else line[:-1]
-        into[m] += line[n]
-    if m < n:
-        coarse *= STRETCH
-
-
-def _merge_cells(coarse: np.ndarray, fine: np.ndarray) -> None:
-    """Zero-order coefficients of merged cells: sums over the fine cells."""
-    coarse[...] = 0
-    two = [fine.shape[a] > coarse.shape[a] for a in range(fine.ndim)]
-    for step in product(*((0, 1) if yes else (0,) for yes in two)):
-        part = fine[tuple(slice(d, None, 1 + yes) for d, yes in zip(step, two, strict=True))]
-        coarse[tuple(slice(0, k) for k in part.shape)] += part

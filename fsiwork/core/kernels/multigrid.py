@@ -64,6 +64,41 @@ def relaxation(d, c, start, n, s, t, factor):
 
 
 @loop
+def merge_along(c, start, children, m, n, factor):
+    """Faces between merged cells of the contiguous direction, m + 1 a row: factor × sums over the fine rows."""
+    for k in prange(start.size):
+        coarse = c[start[k] : start[k] + m + 1]
+        coarse[:] = 0
+        step = 1 if m == n else 2
+        for j in range(children.shape[1]):
+            if children[k, j] >= 0:
+                fine = c[children[k, j] : children[k, j] + n + 1]
+                for i in range(m):
+                    coarse[i] += factor * fine[step * i]
+                coarse[m] += factor * fine[n]
+
+
+@loop
+def merge_rows(c, start, children, m, n, factor):
+    """Coefficients in rows of m: factor × sums over fine rows of n and over merged neighbours in them."""
+    for k in prange(start.size):
+        coarse = c[start[k] : start[k] + m]
+        coarse[:] = 0
+        for j in range(children.shape[1]):
+            if children[k, j] < 0:
+                continue
+            fine = c[children[k, j] : children[k, j] + n]
+            if m == n:
+                for i in range(n):
+                    coarse[i] += factor * fine[i]
+                continue
+            for i in range(n // 2):
+                coarse[i] += factor * (fine[2 * i] + fine[2 * i + 1])
+            if n % 2 == 1:
+                coarse[m - 1] += factor * fine[n - 1]
+
+
+@loop
 def multiply(out, q, c, start, n, s, t, parts):
     """out = A q; ``parts`` = sums of q·out, row by row."""
     for r in prange(start.size):
