@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -99,11 +100,12 @@ def _legend(found: list[Row]) -> str:
     machines = " and ".join(sorted({r["machine"] for r in found}))
     loads = [r["load"] for r in found] or [0.0]
     busy = f"{min(loads):.1f} to {max(loads):.1f}"
-    return (
+    text = (
         f"Least CPU time of many, one thread, {machines}; {busy} processes a core wanted to run at the time."
         " *Bandwidth*: what a triad a = b + s c over arrays of the same size, in the same run, would allow if each"
         " field that a stage needs were read once and each that it changes written once."
     )
+    return textwrap.fill(text, 120)
 
 
 def _show(x: float | None) -> str:
