@@ -170,7 +170,7 @@ def tradeoff_membrane(datasets: Datasets, measured: Measured) -> Figure:
     figure, ax = style.sheet(size=(7.4, 4.6))
     data, finest = datasets["tradeoff_grid"], datasets["tradeoff_finest"]
     found = tradeoff.runs(data, finest)
-    sizes = {int(n): 3.0 + 1.8 * k for k, n in enumerate(np.sort(data["cells"].values))}
+    sizes = {int(n): 2.5 + 2.2 * k for k, n in enumerate(np.sort(data["cells"].values))}
     for run in found:
         look = style.COUPLING[run.point["coupling"]] | {"linestyle": "none", "alpha": 0.65}
         ax.plot(run.cpu, run.error, markersize=sizes[run.point["cells"]], markerfacecolor="none", **look)
@@ -198,5 +198,5 @@ def _mark_book(ax, measured: Measured) -> None:
         return
     ax.plot(*where, marker="*", markersize=13, color=style.OKABE_ITO[3], linestyle="none", zorder=3)
     text = "the book's setting:\n128², Δt = 0.008, semi-implicit"
-    arrow = {"arrowstyle": "-", "color": "0.4"}
-    ax.annotate(text, where, (40, 45), textcoords="offset points", fontsize=8, arrowprops=arrow)
+    arrow = {"arrowstyle": "-", "color": "0.4", "shrinkB": 6}
+    ax.annotate(text, where, (30, 76), textcoords="offset points", fontsize=8, arrowprops=arrow)
