@@ -230,6 +230,21 @@ def test_an_extruded_mixture_equals_the_one_in_two_directions():
     assert np.abs(deep.grid.inside(deep.u[2])).max() < 1e-9
 
 
+def test_no_direction_is_preferred():
+    """A drop in a cube falls alike along every axis."""
+    falls = []
+    for a in range(3):
+        down = [-1.0 if b == a else 0.0 for b in range(3)]
+        flow = flow_in((14, 14, 14), (WALL, WALL, WALL), mu=0.1, gravity=down)
+        drop = immerse(flow, Ball((0.5, 0.5, 0.5), 0.25).distance, (1000.0, 10.0))
+        for _ in range(3):
+            step(flow, (drop,), 0.02)
+        falls.append([np.moveaxis(flow.grid.inside(flow.u[b]), a, 0) for b in (a, (a + 1) % 3)])
+    for main, aside in falls[1:]:
+        assert np.abs(main - falls[0][0]).max() <= 1e-6 * np.abs(main).max()
+        assert np.abs(aside).max() == pytest.approx(np.abs(falls[0][1]).max(), rel=1e-5)
+
+
 # --- drops ----------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("density, viscosity, fluid", list(product(RATIOS, RATIOS, (1e-2, 10.0))))
 def test_a_drop_rises_or_falls_at_any_ratio(density, viscosity, fluid):
