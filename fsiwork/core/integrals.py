@@ -1,0 +1,79 @@
+"""Length of the line φ = 0 of a plane field, by regularised, unregularised and geometric measures; area inside it.
+
+All take a flat padded field with its three ghosts filled (see `fsiwork.core.grid.Grid`); the nodes are the cell
+centres. The measures are for scale: any φ with the right zero line. A field that is not finite gives NaN.
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from fsiwork.core import levelset
+from fsiwork.core.grid import GHOSTS, Grid
+from fsiwork.core.kernels import heights, integrals
+
+
+def _plane(grid: Grid, phi: np.ndarray) -> np.ndarray:
+    if grid.dim != 2:
+        raise ValueError(f"lengths are those of lines in the plane, got {grid.dim} directions")
+    return np.ascontiguousarray(grid.padded(phi), dtype=np.float64)
+
+
+def _dirac(kind: str, scaling: str, cells: float) -> Callable[[Grid, np.ndarray], float]:
+    """Σ D_ε|∇φ| h² with ε = ``cells`` Δx."""
+
+    def length(grid: Grid, phi: np.ndarray) -> float:
+        if not np.isfinite(_plane(grid, phi)).all():
+            return math.nan
+        density = levelset.dirac(phi, cells * grid.h, kind, scaling, grid) * levelset.gradient_norm(grid, phi)
+        return float(grid.inside(density).sum() * grid.cell_volume)
+
+    return length
+
+
+def _sum(kernel, *order: int) -> Callable[[Grid, np.ndarray], float]:
+    def length(grid: Grid, phi: np.ndarray) -> float:
+        q = _plane(grid, phi)
+        return float(kernel(q, GHOSTS, grid.h, *order)) if np.isfinite(q).all() else math.nan
+
+    return length
+
+
+def _heights(grid: Grid, phi: np.ndarray) -> float:
+    return length_and_area(grid, phi)[0]
+
+
+METHODS: dict[str, Callable[[Grid, np.ndarray], float]] = {
+    "plain": _dirac("cosine", "plain", 1.5),
+    "renormalised": _dirac("cosine", "renormalised", 1.5),
+    "one-norm": _dirac("hat", "one-norm", 1.0),
+    "smereka-1": _sum(integrals.smereka, 1),
+    "smereka-2": _sum(integrals.smereka, 2),
+    "towers-laplacian": _sum(integrals.towers_laplacian),
+    "towers-gradient": _sum(integrals.towers_gradient),
+    "marching-squares": _sum(integrals.marching_squares),
+    "geometric": _heights,
+}
+"""Length [length] of φ = 0 by name: D_ε|∇φ| plain, renormalised (ε = 1.5 Δx, cosine) and scaled with the 1-norm (hat,
+ε = Δx) of 1.5.2; Smereka's measures (1.5.3); Towers' two (1.5.4, corrected); marching squares; height functions."""
+
+
+def length(grid: Grid, phi: np.ndarray, method: str = "geometric") -> float:
+    """Length of φ = 0 [length] by one of `METHODS`. Raises ValueError for another, or outside the plane."""
+    if method not in METHODS:
+        raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
+    return METHODS[method](grid, phi)
+
+
+def length_and_area(grid: Grid, phi: np.ndarray) -> tuple[float, float]:
+    """Length of φ = 0 [length] and area of φ < 0 [length²], sixth order where φ is smooth.
+
+    Over all from the first ghosts' centres to the last ones', half a cell more than the box on each side: for closed
+    lines inside the box. Raises ValueError outside the plane.
+    """
+    q = _plane(grid, phi)
+    if not np.isfinite(q).all():
+        return math.nan, math.nan
+    line, area = heights.length_and_area(q, GHOSTS - 1, grid.h)
+    return float(line), float(area)
