@@ -41,7 +41,7 @@ def fig_7_7(datasets: Mapping[str, xr.Dataset], measured: Mapping[str, float]) -
         f"Euler with WENO5 is unstable:\nmodes grow {measured['euler_growth']:.1e} times\nin 500 steps; "
         f"L1 is {measured['euler_over_rk3']:.0f} times RK3's"
     )
-    axes[1, 2].text(0.34, 0.08, text, transform=axes[1, 2].transAxes, fontsize=7.5)
+    axes[1, 2].text(0.66, 0.05, text, transform=axes[1, 2].transAxes, fontsize=6.5, ha="center")
     text = "200 nodes, CFL 0.2, t = 5; centred: always RK3; dashed grey: exact; numbers: L1"
     style.note(figure, datasets, text)
     return figure
