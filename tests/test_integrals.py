@@ -183,6 +183,7 @@ def test_table_1_1_with_few_draws(study):
     assert measured["area_largest"] < 1e-8
     assert measured["geometric_order"] > 5.5
     assert measured["renormalised"] < 0.25
+    assert measured["smereka_2"] < 0.4  # above 4 with the other sign of the term with the curvature
     assert measured["towers_laplacian_order_quadratic"] == pytest.approx(2, abs=0.1)
     assert measured["towers_gradient_order_quadratic"] == pytest.approx(2, abs=0.1)
     assert math.isnan(measured["renormalised_fine"])  # those grids are not in this study
