@@ -71,16 +71,15 @@ def figure(
     artefact: Id, size: Size = "coarse", configs: Configs = CONFIGS, results: Results = RESULTS, output: Out = None
 ) -> None:
     """Draw the figure of an artefact from its datasets and its measured numbers."""
+    from fsiwork.figures.style import save
+
     plan = Plan(configs, results)
     entry = plan.entry(artefact, size)
     if not entry.figure:
         raise Faults(f"{artefact}: has no figure")
     drawn = _made(plan, artefact, size, "figure")
     path = output or Path(plan.file(size, "figures", artefact))
-    path.parent.mkdir(parents=True, exist_ok=True)
-    spare = path.with_name(f"{path.stem}.tmp.png")
-    drawn.savefig(spare, metadata={"Software": None})
-    spare.replace(path)
+    save(drawn, path)
 
 
 def table(

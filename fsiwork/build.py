@@ -24,14 +24,15 @@ def parts(scene: Scene) -> tuple[Flow, tuple[Body, ...]]:
 
 
 def _membrane(spec, grid: Grid, edges: Edges) -> Membrane:
-    carried = spec.transport
+    carried, law = spec.transport, _law(spec.energy)
+    centring = 4 if isinstance(law, laws.Linear) else 2
     return Membrane(
         grid,
         edges,
         shape(spec.shape).distance,
-        _law(spec.energy),
+        law,
         spec.width.of(grid.h),
-        transport=Transport(grid, edges, carried.scheme, carried.tableau, np.dtype(carried.dtype)),
+        transport=Transport(grid, edges, carried.scheme, carried.tableau, np.dtype(carried.dtype), centring),
         stretch=spec.stretch,
         form=spec.form,
         dirac=spec.dirac,

@@ -22,6 +22,7 @@ COST = {
     "pressure, multigrid": (315.0, 420.0, 5e5),
     "diffusion, lines": (3.3, 10.0, 4e4),
     "diffusion, direct": (16.0, 48.0, 8e4),
+    "diffusion, multigrid": (150.0, 300.0, 5e5),
     "mixture": (18.0, 30.0, 1.2e5),
     "transport of a field": (14.0, 25.0, 4e4),
     "φ from the map": (9.0, 25.0, 1e5),
@@ -161,7 +162,9 @@ def _solvers(scene: Scene, step: float) -> list[tuple[str, str, float]]:
         nu += [(b.inside.viscosity, b.inside.density) for b in scene.bodies if b.inside]
         worst = max(mu for mu, _ in nu) / min(rho for _, rho in nu) if variable else fluid.viscosity / fluid.density
         alpha = (0.5 if fluid.diffusion == "implicit" and not variable else 1.0) * step * worst / h**2
-    if stabilised or alpha > 4.0:
+    if variable and alpha > 0.0:
+        found.append(("diffusion", "multigrid", 16.0 * dim))
+    elif stabilised or alpha > 4.0:
         found.append(("diffusion", "direct", 2.0 * dim))
     elif alpha > 0.0:
         found.append(("diffusion", "lines", 1.0 * dim))

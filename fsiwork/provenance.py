@@ -12,6 +12,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from importlib import metadata
 from itertools import pairwise
@@ -72,9 +73,15 @@ def _files(layer: str) -> list[Path]:
 @cache
 def _bare(file: str, function: str, mtime: int, size: int) -> str:
     """Code of a file, or of one function and what it names in the file, without comments and docstrings."""
+    tree = _tree(file, mtime, size)
+    body = _reached(tree.body, function) if function else tree.body
+    return ast.dump(ast.Module(body, tree.type_ignores))
+
+
+@cache
+def _tree(file: str, mtime: int, size: int) -> ast.Module:
+    """Syntax tree of a file without docstrings; a file is read once."""
     tree = ast.parse(Path(file).read_text(encoding="utf-8"))
-    if function:
-        tree.body = _reached(tree.body, function)
     for node in ast.walk(tree):
         body = getattr(node, "body", None)
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and body:
@@ -85,7 +92,7 @@ def _bare(file: str, function: str, mtime: int, size: int) -> str:
                 and isinstance(first.value.value, str)
             ):
                 node.body = body[1:] or [ast.Pass()]
-    return ast.dump(tree)
+    return tree
 
 
 def _reached(body: list[ast.stmt], function: str) -> list[ast.stmt]:
@@ -112,12 +119,15 @@ def _defined(statement: ast.stmt) -> set[str]:
 def versions(names: tuple[str, ...] = (*NUMERICS, "xarray", "netCDF4")) -> dict[str, str]:
     """Installed versions of Python, fsiwork and packages, without importing them."""
     found = {"python": platform.python_version()}
-    for name in ("fsiwork", *names):
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            found[name] = "not installed"
-    return found
+    return found | {name: _version(name) for name in ("fsiwork", *names)}
+
+
+@cache
+def _version(name: str) -> str:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return "not installed"
 
 
 def scene_id(scene_json: str | dict) -> str:
@@ -256,6 +266,9 @@ def cost_path(path: Path) -> Path:
 
 def peak_memory() -> int:
     """Largest resident memory of this process so far [bytes]; 0 where the system does not tell."""
+    with suppress(OSError, StopIteration):  # Linux: `getrusage` would count what the parent had before the fork
+        lines = Path("/proc/self/status").read_text().splitlines()
+        return 1024 * next(int(line.split()[1]) for line in lines if line.startswith("VmHWM:"))
     try:
         import resource
     except ImportError:

@@ -96,7 +96,8 @@ class Membrane(Body):
         if self.inside is None and not self.surface_mass:
             return
         rho, mu = self.inside or (flow.density, flow.viscosity)
-        self._mix(flow.mixture("rho"), rho, self.surface_mass)
+        if rho != flow.density or self.surface_mass:
+            self._mix(flow.mixture("rho"), rho, self.surface_mass)
         if mu != flow.viscosity:
             self._mix(flow.mixture("mu"), mu, 0.0)
 

@@ -39,6 +39,9 @@ class Transport:
     scheme : ``weno5`` (Jiang and Shu's weights), ``weno-z`` (fifth order at critical points too),
         ``upwind5`` (their linear limit: for smooth fields such as x - Y) or ``upwind1``
     tableau : ``ssp-rk3``, ``ssp-rk2`` or ``euler`` (the last sharpens kinks with WENO: for figures only)
+    centring : order of the velocity at the centres. 4, (-1, 9, 9, -1)/16, loses a quarter of the volume of an
+        oscillating drop that 2 loses; 2 is the adjoint of how a membrane's force goes to the faces, and with 4 a
+        membrane makes energy
     dtype : of the fields; float32 is safe at any magnitude of the field because the weights are relative
 
     Attributes
@@ -50,14 +53,22 @@ class Transport:
     ValueError : unknown scheme or tableau
     """
 
-    def __init__(self, grid: Grid, edges, scheme: Scheme = "weno5", tableau: str = "ssp-rk3", dtype=np.float64):
+    def __init__(
+        self,
+        grid: Grid,
+        edges,
+        scheme: Scheme = "weno5",
+        tableau: str = "ssp-rk3",
+        dtype=np.float64,
+        centring: Literal[2, 4] = 2,
+    ):
         name = scheme.replace("-", "_")
         if scheme not in ("weno5", "weno-z", "upwind5", "upwind1"):
             raise ValueError(f"transport scheme must be weno5, weno-z, upwind5 or upwind1, got {scheme!r}")
         if tableau not in TABLEAUX:
             raise ValueError(f"tableau must be one of {', '.join(TABLEAUX)}, got {tableau!r}")
         self.grid, self.edges, self.stages = grid, edges, TABLEAUX[tableau]
-        self.dtype = np.dtype(dtype)
+        self.dtype, self.centring = np.dtype(dtype), centring
         self.weighted = scheme.startswith("weno")
         self.floor = FLOORS.get((scheme, self.dtype.type), 1.0)
         self._stage, self._steepest, self._fastest = (
@@ -74,23 +85,27 @@ class Transport:
         """Carry every field over ``dt`` in place; ghosts are filled on entry of each stage and at the end.
 
         ``fields`` are flat fields at centres of the dtype given; ``u`` the components on their low faces
-        [length/time], constant in time; ``rule`` is handed to ``edges.fill_scalar``. Takes
+        [length/time], ghosts filled, constant in time; ``rule`` is handed to ``edges.fill_scalar``. Takes
         as many equal substeps as keep dt Σ|u_i|/h at or below `COURANT`.
         """
-        u = self._same_type(u)
+        u = self._centred(u)
         dt = dt / self._count(u, dt)
         for q in fields:
             self._weights(q, rule)
             for _ in range(self.substeps):
                 self._substep(q, u, dt, rule)
 
-    def _same_type(self, u: Sequence[np.ndarray]) -> Sequence[np.ndarray]:
-        if all(c.dtype == self.dtype for c in u):
+    def _centred(self, u: Sequence[np.ndarray]) -> Sequence[np.ndarray]:
+        """Face values of the fields' dtype whose plain average is the velocity at the centres."""
+        if self.centring == 2 and all(c.dtype == self.dtype for c in u):
             return u
         if not self._u:
             self._u = [self.grid.field(self.dtype) for _ in u]
-        for copy, c in zip(self._u, u, strict=True):
-            np.copyto(copy, c, casting="same_kind")
+        for copy, c, s in zip(self._u, u, self.grid.strides, strict=True):
+            if self.centring == 2:
+                np.copyto(copy, c, casting="same_kind")
+            else:
+                kernels.sharpen(copy, c, *self.grid.rows(0, 1), s)
         return self._u
 
     def _count(self, u, dt: float) -> int:

@@ -203,13 +203,22 @@ def _reached(path: Path) -> set[str]:
     """Modules of studies/ and figures/ that a module imports, transitively, as ``studies.exact``."""
     found, waiting = set(), [path]
     while waiting:
-        for node in ast.walk(ast.parse(waiting.pop().read_text(encoding="utf-8"))):
-            if not isinstance(node, ast.ImportFrom) or not (node.module or "").startswith("fsiwork."):
-                continue
-            base = node.module.removeprefix("fsiwork.")
-            for name in (base, *(f"{base}.{alias.name}" for alias in node.names)):
-                file = PACKAGE.joinpath(*name.split(".")).with_suffix(".py")
-                if name.split(".")[0] in ("studies", "figures") and file.is_file() and name not in found:
-                    found.add(name)
-                    waiting.append(file)
+        new = _imported(waiting.pop()) - found
+        found |= new
+        waiting += [PACKAGE.joinpath(*name.split(".")).with_suffix(".py") for name in new]
     return found
+
+
+@cache
+def _imported(path: Path) -> frozenset[str]:
+    """Those that it imports itself; a file is read once."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if not isinstance(node, ast.ImportFrom) or not (node.module or "").startswith("fsiwork."):
+            continue
+        base = node.module.removeprefix("fsiwork.")
+        for name in (base, *(f"{base}.{alias.name}" for alias in node.names)):
+            rooms = name.split(".")
+            if rooms[0] in ("studies", "figures") and PACKAGE.joinpath(*rooms).with_suffix(".py").is_file():
+                found.add(name)
+    return frozenset(found)
