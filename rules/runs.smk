@@ -1,6 +1,7 @@
 # From scenes to datasets: each run is a file, each study is its runs put together.
 
 
+# Not ancient() where it is used: with that, a changed solver made `all` stop after this rule (Snakemake 9.27).
 rule warm_cache:
     output:
         touch("results/{size}/warm_cache.done"),
@@ -16,7 +17,7 @@ rule warm_cache:
 rule run:
     input:
         scene=PLAN.scene_of,
-        warm=ancient("results/{size}/warm_cache.done"),
+        warm="results/{size}/warm_cache.done",
     output:
         data="results/{size}/runs/{study}/{job}.nc",
         cost="results/{size}/runs/{study}/{job}.cost.json",
@@ -39,7 +40,7 @@ rule run:
 rule call:
     input:
         scene=PLAN.scene_of,
-        warm=ancient("results/{size}/warm_cache.done"),
+        warm="results/{size}/warm_cache.done",
     output:
         data="results/{size}/runs/{study}/{job}.json",
         cost="results/{size}/runs/{study}/{job}.cost.json",
@@ -69,7 +70,7 @@ for batched, runs in PLAN.batched(SIZE).items():
             f"batch_{batched}"
         input:
             scene=PLAN.configs / "scenes" / f"{PLAN.study(batched, SIZE).scene}.yaml",
-            warm=ancient("results/{size}/warm_cache.done"),
+            warm="results/{size}/warm_cache.done",
         output:
             [
                 f"results/{{size}}/runs/{batched}/{run}.{ending}"
