@@ -41,11 +41,6 @@ class Edges:
         """Whether direction a is periodic."""
         return self.sides[a][0].kind == "periodic"
 
-    @property
-    def steady_flux(self) -> bool:
-        """Whether fluid crosses a side (inflow, outflow)."""
-        return any(side.kind in ("inflow", "outflow") for pair in self.sides for side in pair)
-
     def ends_pressure(self) -> tuple[tuple[str, str], ...]:
         """Ends of the pressure's Poisson problem in the words of `core.poisson`."""
         words = {"periodic": "periodic", "outflow": "dirichlet"}
