@@ -59,7 +59,7 @@ $(READY): requirements.lock pyproject.toml
 
 # The lock serves Linux and macOS, x86 and ARM; it names no registry.
 lock:
-	uv pip compile pyproject.toml --extra test --extra build --universal --python-version 3.11 --generate-hashes \
+	uv pip compile pyproject.toml --extra test --extra build --extra compare --universal --python-version 3.11 --generate-hashes \
 		--no-header --no-annotate --no-emit-index-url --upgrade --quiet -o requirements.lock
 
 FORCE:
