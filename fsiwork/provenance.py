@@ -149,10 +149,10 @@ def cache_root() -> Path:
 def prepare(threads: int = 1) -> Path:
     """Set up Numba's threads and its cache folder; call it before anything imports Numba.
 
-    The cache folder carries the hash of the kernels' sources, because Numba does not notice an edit in a callee
-    of another file. Returns the folder.
+    Numba sees an edit in a kernel's own file, but not in a callee of another file: the cache folder carries the hash of
+    the `shared` files, so that an edit elsewhere compiles no more than its own file. Returns the folder.
     """
-    folder = cache_root() / "numba" / source_hash("core", "bodies")
+    folder = cache_root() / "numba" / source_hash(*shared(PACKAGE / "core" / "kernels"))
     os.environ["NUMBA_CACHE_DIR"] = str(folder)
     os.environ["NUMBA_NUM_THREADS"] = str(threads)
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
@@ -160,6 +160,18 @@ def prepare(threads: int = 1) -> Path:
         numba.config.CACHE_DIR = str(folder)
         numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
     return folder
+
+
+def shared(kernels: Path) -> tuple[str, ...]:
+    """Modules of a folder of kernels from which other files of it import, and the folder's own ``__init__``."""
+    package = ".".join(kernels.relative_to(PACKAGE).parts)
+    names = {f"{package}.__init__"}
+    for file in kernels.glob("*.py"):
+        stamp = file.stat()
+        for node in ast.walk(_tree(str(file), stamp.st_mtime_ns, stamp.st_size)):
+            if isinstance(node, ast.ImportFrom) and node.module.startswith(f"fsiwork.{package}."):
+                names.add(node.module.removeprefix("fsiwork."))
+    return tuple(sorted(names))
 
 
 def with_healed_cache(action: Callable[[], T]) -> T:

@@ -14,6 +14,7 @@ import pytest
 
 from fsiwork import provenance
 
+KERNELS = provenance.PACKAGE / "core" / "kernels"
 SMALL = {
     "core/grid.py": 'def area(h):\n    """Area."""\n    return h * h\n',
     "bodies/body.py": "class Body:\n    pass\n",
@@ -120,7 +121,25 @@ def test_prepare_sets_threads_and_an_own_cache():
         print(numba.config.NUMBA_NUM_THREADS, numba.config.CACHE_DIR == str(folder), folder.name)
         """
     done = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["1", "True", provenance.source_hash("core", "bodies")]
+    assert done.stdout.split() == ["1", "True", provenance.source_hash(*provenance.shared(KERNELS))]
+
+
+def test_every_kernel_that_another_file_calls_counts_for_the_cache():
+    """A jitted function used outside its file must be in a `shared` one, or an edit of it would go unnoticed."""
+    names = provenance.shared(KERNELS)
+    assert {"core.kernels.__init__", "core.kernels.membrane"} <= set(names)
+    for file in provenance.PACKAGE.rglob("*.py"):
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+        jitted = any(
+            isinstance(node, ast.FunctionDef) and {"loop", "point", "njit"} & _decorators(node) for node in tree.body
+        )
+        for node in ast.walk(tree) if jitted else ():
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("fsiwork.core.kernels."):
+                assert node.module.removeprefix("fsiwork.") in names, f"{file}: calls kernels of {node.module}"
+
+
+def _decorators(function):
+    return {name.id for d in function.decorator_list for name in ast.walk(d) if isinstance(name, ast.Name)}
 
 
 KERNEL = """
