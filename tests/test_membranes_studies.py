@@ -177,7 +177,7 @@ def test_fig_3_11_holds_the_axes_against_the_circle():
     assert red("fig_3_11", fig_3_11(rest=1.02 * R)) == {"axis_error"}
     assert red("fig_3_11", fig_3_11(axis_y=0.99 * R + 0 * T)) == {"axis_error"}
     assert red("fig_3_11", fig_3_11(ended="diverged at t=4")) == {"axis_error"}
-    assert red("fig_3_11", fig_3_11(width=3, rest=1.02 * R)) == set()  # printed only
+    assert red("fig_3_11", fig_3_11(width=3, rest=1.02 * R)) == {"axis_error_width_3"}
     assert membranes.fig_3_11(fig_3_11(width=3, rest=1.02 * R))["axis_error_width_3"] == pytest.approx(2, abs=0.1)
 
 

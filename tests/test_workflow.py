@@ -79,7 +79,7 @@ mini:
     - {metric: place, kind: at_least, expected: 4.0, source: exact}
     - {metric: steps, kind: at_most, expected: 12, source: count}
     - {metric: volume, kind: near, expected: 0.942, tolerance: 0.05, source: πab}
-    - {metric: nothing, kind: at_most, expected: 1.0, source: is not a number}
+    - {metric: nothing, kind: at_most, expected: 1.0, source: here, why: is not a number}
     - {metric: forgotten, kind: at_most, expected: 1.0, source: is not measured}
 """,
 }
@@ -122,6 +122,7 @@ def test_the_scorecard_has_one_row_a_check_and_tells_failures(book):
     }  # fmt: skip
     assert rows[0]["measured"] == 9.5
     assert rows[4]["measured"] is None
+    assert rows[4]["why"] == "is not a number"
     assert rows[0]["cells"] == 24
     assert rows[0]["steps"] == 2 * (2 + 4) + 4
     assert rows[0]["cpu_seconds"] > 0
@@ -132,6 +133,7 @@ def test_the_pages_of_the_scorecard_show_pictures_and_escape(book):
     assert 'src="coarse/figures/mini.png"' in page
     assert "A parabola &amp; a drop" in page
     assert page.count("FAIL</td>") == 2
+    assert page.count("here. Fails: is not a number") == 1
     assert "| mini | last | 9.5 | ≈ 9.5 ± 0 | pass | exact | coarse |" in (book / "results/scorecard.md").read_text()
 
 

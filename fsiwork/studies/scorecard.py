@@ -41,6 +41,8 @@ def rows(entry: Entry, size: str, measured: dict[str, float], cost: dict[str, fl
         row = {"artefact": entry.id, "metric": check.metric, "measured": value if math.isfinite(value) else None}
         row |= {"kind": check.kind, "expected": check.expected, "tolerance": check.tolerance}
         row |= {"pass": passes(check, value), "source": check.source, "size": size, **cost}
+        if check.why and not row["pass"]:
+            row["why"] = check.why
         made.append(row)
     return made
 
@@ -130,7 +132,7 @@ def cells(row: dict[str, Any]) -> list[str]:
         number(row["measured"]),
         expected(row),
         outcome,
-        row["source"],
+        f"{row['source']}. Fails: {row['why']}" if "why" in row else row["source"],
         row["size"],
     ]
     return [*first, str(row["cells"]), str(row["steps"]), f"{row['cpu_seconds']:.1f}"]

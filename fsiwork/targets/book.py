@@ -8,18 +8,22 @@ from fsiwork.targets.reading import FUNCTION, IDENTIFIER, SIZES, Faults, read_ya
 
 KINDS = ("near", "at_most", "at_least")
 ENTRY_KEYS = {"title", "chapter", "studies", "figure", "table", "measure", "caption", "checks"}
-CHECK_KEYS = {"metric", "kind", "expected", "tolerance", "source", *SIZES}
+CHECK_KEYS = {"metric", "kind", "expected", "tolerance", "source", "why", *SIZES}
 
 
 @dataclass(frozen=True)
 class Check:
-    """One number and what it is held against: near (within tolerance), at_most or at_least ``expected``."""
+    """One number and what it is held against: near (within tolerance), at_most or at_least ``expected``.
+
+    ``why`` says, where a check is known to fail, what was found; it changes nothing about passing.
+    """
 
     metric: str
     kind: str
     expected: float
     tolerance: float
     source: str
+    why: str = ""
 
 
 @dataclass(frozen=True)
@@ -94,6 +98,8 @@ def _check(raw: Any, size: str) -> tuple[list[str], list[Check]]:
     for key in ("metric", "source"):
         if not isinstance(raw.get(key), str) or not raw[key]:
             faults.append(f"{key}: is missing")
+    if not isinstance(raw.get("why", ""), str):
+        faults.append(f"why: must be a text, got {raw['why']!r}")
     if faults:
         return faults, []
-    return [], [Check(raw["metric"], kind, float(expected), float(tolerance), raw["source"])]
+    return [], [Check(raw["metric"], kind, float(expected), float(tolerance), raw["source"], raw.get("why", ""))]
