@@ -1,4 +1,4 @@
-"""Signed distance to the interface φ = 0 of any level set with the right zero line, by several methods behind one door."""
+"""Distance to the line or surface φ = 0 of any level set with the right zeros: several methods behind one door."""
 
 from collections.abc import Callable
 from importlib import import_module
