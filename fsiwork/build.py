@@ -1,45 +1,95 @@
 """From specs to objects: the one place that knows both the words of a scene and the classes of the solver."""
 
+import functools
+
 import numpy as np
 
 from fsiwork.bodies import laws
 from fsiwork.bodies.body import Body
+from fsiwork.bodies.bubbles import Bubbles
+from fsiwork.bodies.interface import Interface
 from fsiwork.bodies.membrane import Membrane
-from fsiwork.core import shapes
+from fsiwork.core import motion, shapes
 from fsiwork.core.edges import Edges, Side
 from fsiwork.core.flow import Flow
 from fsiwork.core.grid import Grid
+from fsiwork.core.redistance import redistance
 from fsiwork.core.transport import Transport
 from fsiwork.scene import Scene
 
 
-def parts(scene: Scene) -> tuple[Flow, tuple[Body, ...]]:
-    """Flow and bodies of a scene as they are at t = 0."""
-    box, fluid = scene.box, scene.fluid
+def parts(scene: Scene) -> tuple[Flow | motion.Motion, tuple[Body, ...]]:
+    """Flow or motion and bodies of a scene as they are at t = 0."""
+    box = scene.box
     grid = Grid(box.n, box.h, box.origin)
     edges = Edges(grid, tuple(tuple(_side(spec) for spec in pair) for pair in box.sides))
+    bodies = tuple(BODIES[spec.kind](spec, grid, edges) for spec in scene.bodies)
+    if scene.motion is not None:
+        return motion.Motion(grid, edges, _field(scene.motion, grid), scene.motion.period), bodies
+    fluid = scene.fluid
     flow = Flow(grid, edges, fluid.density, fluid.viscosity, scene.gravity, fluid.advection, fluid.diffusion)
     _set_in_motion(flow, fluid.initial)
-    return flow, tuple(BODIES[spec.kind](spec, grid, edges) for spec in scene.bodies)
+    return flow, bodies
+
+
+def _field(spec, grid: Grid) -> motion.Field:
+    """The velocity of a prescribed motion."""
+    if spec.kind == "rotation":
+        return motion.Rotation(spec.centre, spec.rate)
+    if spec.kind == "translation":
+        return motion.Translation(spec.velocity)
+    return {"vortex": motion.Vortex, "deformation": motion.Deformation}[spec.kind](grid.origin, grid.length, spec.speed)
 
 
 def _membrane(spec, grid: Grid, edges: Edges) -> Membrane:
-    carried, law = spec.transport, _law(spec.energy)
-    centring = 4 if isinstance(law, laws.Linear) else 2
+    law = _law(spec.energy)
     return Membrane(
         grid,
         edges,
         shape(spec.shape).distance,
         law,
         spec.width.of(grid.h),
-        transport=Transport(grid, edges, carried.scheme, carried.tableau, np.dtype(carried.dtype), centring),
+        transport=_transport(spec.transport, grid, edges, 4 if isinstance(law, laws.Linear) else 2),
         stretch=spec.stretch,
         form=spec.form,
         dirac=spec.dirac,
         coupling=spec.coupling,
-        carry=carried.carry,
+        carry=spec.transport.carry,
         inside=None if spec.inside is None else (spec.inside.density, spec.inside.viscosity),
         surface_mass=spec.surface_mass,
+    )
+
+
+def _bubbles(spec, grid: Grid, edges: Edges) -> Bubbles:
+    return Bubbles(
+        grid,
+        edges,
+        [shape(part.shape).distance for part in spec.parts],
+        [part.buoyancy if spec.boussinesq else part.density for part in spec.parts],
+        spec.width.of(grid.h),
+        transport=_transport(spec.transport, grid, edges, 4),
+        tension=spec.tension,
+        boussinesq=spec.boussinesq,
+        viscosity=spec.viscosity,
+        coupling=spec.coupling,
+        carry=spec.transport.carry,
+    )
+
+
+def _transport(spec, grid: Grid, edges: Edges, centring: int) -> Transport:
+    return Transport(grid, edges, spec.scheme, spec.tableau, np.dtype(spec.dtype), centring)
+
+
+def _interface(spec, grid: Grid, edges: Edges) -> Interface:
+    anew = spec.redistance
+    return Interface(
+        grid,
+        edges,
+        shape(spec.shape).distance,
+        transport=_transport(spec.transport, grid, edges, 4),
+        carry=spec.transport.carry,
+        redistance=functools.partial(redistance, method=anew.method) if anew else None,
+        every=anew.every if anew else 1,
     )
 
 
@@ -48,7 +98,7 @@ def _law(spec) -> laws.Law:
     return LAWS[kind](spec.stiffness) if kind in LAWS else spec
 
 
-BODIES = {"membrane": _membrane}
+BODIES = {"membrane": _membrane, "bubbles": _bubbles, "interface": _interface}
 LAWS = {"quadratic": laws.Quadratic, "linear": laws.Linear}
 SHAPES = {
     "ball": shapes.Ball,

@@ -6,7 +6,7 @@ Arithmetic on the scene alone: nothing of the solver is loaded.
 import math
 from dataclasses import dataclass
 
-from fsiwork.scene import Membrane, Scene, SceneError
+from fsiwork.scene import Body, Membrane, Scene, SceneError
 
 GHOSTS = 3  # as in core.grid, which this module does not load
 SHARE = 0.8  # of the available memory
@@ -28,6 +28,7 @@ COST = {
     "φ from the map": (9.0, 25.0, 1e5),
     "force": (2.0, 5.0, 3e4),
     "prediction of φ, direct": (8.0, 12.0, 6e4),
+    "distance anew": (60.0, 300.0, 1e5),
     "gauges": (3.5, 7.0, 7e4),
 }
 START = 1.0  # seconds to load everything, kernels from the cache
@@ -122,21 +123,27 @@ def duration(seconds: float) -> str:
 
 
 def _variable(scene: Scene) -> bool:
-    return any(body.inside or body.surface_mass for body in scene.bodies)
+    return any(body.inside or body.surface_mass for _, body in _membranes(scene))
 
 
-def _carried(body: Membrane, dim: int) -> int:
+def _carried(body: Body, dim: int) -> int:
     return 1 + dim * (body.transport.carry == "map")
 
 
 def _fields(scene: Scene) -> list[tuple[str, int]]:
     """(what, how many padded fields), as core.flow, core.transport and bodies.membrane allocate them."""
     dim, fluid = scene.box.dim, scene.fluid
+    if fluid is None:
+        passive = [("velocity: now, at first", 2 * dim)]
+        return passive + [line for i, body in enumerate(scene.bodies) for line in _passive(i, body, dim)]
     found = [("velocity: now, next, rate", 3 * dim), ("pressure, viscosity", 3), ("force", dim * bool(scene.bodies))]
     if _variable(scene):
         other = any(b.inside and b.inside.viscosity != fluid.viscosity for b in scene.bodies)
         found += [("mixture: ρ, μ, 1/ρ on faces, ψ", dim + 2 + other), ("force", 0 if scene.bodies else dim)]
     for i, body in enumerate(scene.bodies):
+        if not isinstance(body, Membrane):
+            found += _passive(i, body, dim)
+            continue
         carry = _carried(body, dim)
         linear = getattr(body.energy, "kind", "") == "linear"
         form = body.form if body.form != "auto" else "normal-tangential" if linear else "divergence"
@@ -150,16 +157,29 @@ def _fields(scene: Scene) -> list[tuple[str, int]]:
     return found
 
 
+def _passive(i: int, body: Body, dim: int) -> list[tuple[str, int]]:
+    """Fields of a body that only goes along: φ or Y, Runge-Kutta stages, velocity at the centres, φ₀(Y)."""
+    carry = _carried(body, dim)
+    return [(f"body {i}: φ{', Y' * (carry > 1)}", carry), (f"body {i}: stages, u at centres, scratch", 4 + dim)]
+
+
+def _membranes(scene: Scene) -> list[tuple[int, Membrane]]:
+    return [(i, body) for i, body in enumerate(scene.bodies) if isinstance(body, Membrane)]
+
+
 def _solvers(scene: Scene, step: float) -> list[tuple[str, str, float]]:
     """(for what, which, bytes over those of one compact field)."""
     dim, fluid, h = scene.box.dim, scene.fluid, scene.box.h
+    if fluid is None:
+        return []
     variable = _variable(scene)
     found = [("pressure", "multigrid", 16.0) if variable else ("pressure", "direct", 2.5)]
-    stabilised = any(body.coupling in ("stabilised", "iterated") for body in scene.bodies)
+    membranes = _membranes(scene)
+    stabilised = any(body.coupling in ("stabilised", "iterated") for _, body in membranes)
     alpha = 0.0
     if fluid.diffusion != "explicit":
         nu = [(fluid.viscosity, fluid.density)]
-        nu += [(b.inside.viscosity, b.inside.density) for b in scene.bodies if b.inside]
+        nu += [(b.inside.viscosity, b.inside.density) for _, b in membranes if b.inside]
         worst = max(mu for mu, _ in nu) / min(rho for _, rho in nu) if variable else fluid.viscosity / fluid.density
         alpha = (0.5 if fluid.diffusion == "implicit" and not variable else 1.0) * step * worst / h**2
     if variable and alpha > 0.0:
@@ -168,7 +188,7 @@ def _solvers(scene: Scene, step: float) -> list[tuple[str, str, float]]:
         found.append(("diffusion", "direct", 2.0 * dim))
     elif alpha > 0.0:
         found.append(("diffusion", "lines", 1.0 * dim))
-    for i, body in enumerate(scene.bodies):
+    for i, body in membranes:
         if body.coupling == "semi-implicit":
             found.append((f"body {i}: prediction of φ", "direct", 1.5))
     return found
@@ -176,8 +196,8 @@ def _solvers(scene: Scene, step: float) -> list[tuple[str, str, float]]:
 
 def _stages(scene: Scene, solvers) -> list[tuple[str, float]]:
     """(name in COST, how many times a step)."""
-    found = [(f"advection {scene.fluid.advection}", 1.0)]
-    passes = 2.0 if any(body.coupling == "iterated" for body in scene.bodies) else 1.0
+    found = [(f"advection {scene.fluid.advection}", 1.0)] if scene.fluid else []
+    passes = 2.0 if any(body.coupling == "iterated" for _, body in _membranes(scene)) else 1.0
     for what, which, _ in solvers:
         if "prediction" not in what:
             found.append((f"{what}, {which}", 1.0))
@@ -185,9 +205,14 @@ def _stages(scene: Scene, solvers) -> list[tuple[str, float]]:
         found.append(("mixture", 1.0))
     for body in scene.bodies:
         carry = _carried(body, scene.box.dim)
-        found += [("force", 1.0), ("transport of a field", float(carry - 1 or 1))]
+        found.append(("transport of a field", float(carry - 1 or 1)))
         if carry > 1:
             found.append(("φ from the map", 1.0))
+        if anew := getattr(body, "redistance", None):
+            found.append(("distance anew", 1.0 / anew.every))
+        if not isinstance(body, Membrane):
+            continue
+        found.append(("force", 1.0))
         if body.coupling == "semi-implicit":
             found.append(("prediction of φ, direct", 1.0))
     totals: dict[str, float] = {}
@@ -217,9 +242,9 @@ def _step(scene: Scene) -> float:
     speed = _speed(scene)
     if speed > 0:
         limits.append(0.5 * h / speed)
-    if fluid.diffusion == "explicit" and fluid.viscosity > 0:
+    if fluid and fluid.diffusion == "explicit" and fluid.viscosity > 0:
         limits.append(h**2 * fluid.density / (4 * scene.box.dim * fluid.viscosity))
-    for body in scene.bodies:
+    for _, body in _membranes(scene):
         tension = _tension(body)
         if tension > 0:
             rho = min(fluid.density, body.inside.density) if body.inside else fluid.density
@@ -245,6 +270,8 @@ def _speed(scene: Scene) -> float:
     """Sum over the directions of the largest velocity that the scene itself names."""
     sides = [side for pair in scene.box.sides for side in pair]
     speeds = [sum(map(abs, side.velocity)) for side in sides if hasattr(side, "velocity")]
+    if scene.motion:
+        return scene.motion.top(scene.box.origin, scene.box.length)
     initial = scene.fluid.initial
     if initial.kind == "taylor-green":
         speeds.append(2 * abs(initial.amplitude))

@@ -12,10 +12,24 @@ import yaml
 from pydantic import TypeAdapter, ValidationError, WrapValidator
 
 from fsiwork.specs.base import Positive, Spec, sense, tried, whole
-from fsiwork.specs.bodies import Body, Energy, Law, Linear, Membrane, Quadratic, Transport, Width
+from fsiwork.specs.bodies import (
+    Body,
+    Bubble,
+    Bubbles,
+    Energy,
+    Interface,
+    Law,
+    Linear,
+    Membrane,
+    Quadratic,
+    Redistance,
+    Transport,
+    Width,
+)
 from fsiwork.specs.box import Box, Edges, FreeSlip, Inflow, NoSlip, Outflow, Periodic, Side, Wall
 from fsiwork.specs.faults import Fault, got, wording, wrong
 from fsiwork.specs.fluid import Fluid, Inside, Rest, Shear, TaylorGreen
+from fsiwork.specs.motion import Deformation, Motion, Rotation, Translation, Vortex
 from fsiwork.specs.shapes import (
     Ball,
     Block,
@@ -34,10 +48,11 @@ from fsiwork.specs.shapes import (
 from fsiwork.specs.yaml import Loader
 
 __all__ = [
-    "Ball", "Block", "Body", "Box", "Capsule", "Cassini", "Clock", "Edges", "Ellipsoid", "Energy", "Fluid",
-    "FreeSlip", "Inflow", "Inside", "Intersection", "Law", "Linear", "Membrane", "Minus", "Moved", "NoSlip",
-    "Outflow", "Output", "Periodic", "Polygon", "Quadratic", "Rest", "Scene", "SceneError", "Shape", "Shear",
-    "Side", "Slot", "TaylorGreen", "Torus", "Transport", "Union", "Wall", "Width", "faults", "load", "loads",
+    "Ball", "Block", "Body", "Box", "Bubble", "Bubbles", "Capsule", "Cassini", "Clock", "Deformation", "Edges",
+    "Ellipsoid", "Energy", "Fluid", "FreeSlip", "Inflow", "Inside", "Interface", "Intersection", "Law", "Linear",
+    "Membrane", "Minus", "Motion", "Moved", "NoSlip", "Outflow", "Output", "Periodic", "Polygon", "Quadratic",
+    "Redistance", "Rest", "Rotation", "Scene", "SceneError", "Shape", "Shear", "Side", "Slot", "TaylorGreen", "Torus",
+    "Translation", "Transport", "Union", "Vortex", "Wall", "Width", "faults", "load", "loads",
 ]  # fmt: skip
 
 
@@ -88,10 +103,11 @@ class Output(Spec):
 
 
 class Scene(Spec):
-    """Everything that determines a run."""
+    """Everything that determines a run: in the box either a fluid or a prescribed motion, and bodies."""
 
     box: Box
-    fluid: Fluid
+    fluid: Fluid | None = None
+    motion: Motion | None = None
     bodies: tuple[Body, ...] = ()
     clock: Clock
     output: Output = Output()
@@ -99,16 +115,34 @@ class Scene(Spec):
     @property
     def gravity(self) -> tuple[float, ...]:
         """Gravity with one number a direction [length/time²]."""
-        return self.fluid.gravity or (0.0,) * self.box.dim
+        return (self.fluid and self.fluid.gravity) or (0.0,) * self.box.dim
+
+    @sense
+    def _fluid_or_motion(self) -> Iterator[Fault]:
+        if (self.fluid is None) == (self.motion is None):
+            yield ("fluid",), "is required, or a motion" if self.fluid is None else "must not stand beside a motion"
+
+    @sense
+    def _motion_fits(self) -> Iterator[Fault]:
+        if self.motion is None:
+            return
+        for path, text in self.motion.misfits(self.box.dim):
+            yield ("motion", *path), text
+        kinds = {side.kind for pair in self.box.sides for side in pair} - {"periodic", "no-slip", "free-slip"}
+        if kinds:
+            yield ("box", "edges"), f"a motion gives the velocity, not a side that is {', '.join(sorted(kinds))}"
+        for k, name in enumerate(self.output.fields):
+            if name in ("p", "rho", "mu"):
+                yield ("output", "fields", k), f"{name}: needs a fluid, the scene has a motion; name output.fields"
 
     @sense
     def _gravity(self) -> Iterator[Fault]:
-        if self.fluid.gravity and len(self.fluid.gravity) != self.box.dim:
+        if self.fluid and self.fluid.gravity and len(self.fluid.gravity) != self.box.dim:
             yield ("fluid", "gravity"), f"must have {self.box.dim} numbers, got {len(self.fluid.gravity)}"
 
     @sense
     def _vortices(self) -> Iterator[Fault]:
-        if self.fluid.initial.kind == "taylor-green":
+        if self.fluid and self.fluid.initial.kind == "taylor-green":
             kinds = {side.kind for pair in self.box.sides[:2] for side in pair}
             if not kinds <= {"periodic", "free-slip"}:
                 yield ("fluid", "initial"), "vortices need periodic or free-slip sides along x and y"
@@ -117,14 +151,21 @@ class Scene(Spec):
     def _bodies_in_box(self) -> Iterator[Fault]:
         for i, body in enumerate(self.bodies):
             yield from tried(self._shape_fits(i, body))
-            yield from tried(self._width_fits(i, body))
+            if not isinstance(body, Interface):
+                yield from tried(self._width_fits(i, body))
+                yield from tried(self._has_a_fluid(i, body))
 
-    def _shape_fits(self, i: int, body: Membrane) -> Iterator[Fault]:
-        misfits = list(body.shape.misfits(self.box.dim))
-        for path, text in misfits or _outside(body.shape, self.box):
-            yield ("bodies", i, "shape", *path), text
+    def _has_a_fluid(self, i: int, body) -> Iterator[Fault]:
+        if self.motion is not None:
+            yield ("bodies", i, "kind"), f"{body.kind} needs a fluid; with a motion go bodies of kind interface"
 
-    def _width_fits(self, i: int, body: Membrane) -> Iterator[Fault]:
+    def _shape_fits(self, i: int, body) -> Iterator[Fault]:
+        for where, shape in _shapes(body):
+            misfits = list(shape.misfits(self.box.dim))
+            for path, text in misfits or _outside(shape, self.box):
+                yield ("bodies", i, *where, *path), text
+
+    def _width_fits(self, i: int, body) -> Iterator[Fault]:
         h, width = self.box.h, body.width
         if not width.of(h) >= h * (1 - 1e-9):
             knob = "length" if width.cells is None else "cells"
@@ -140,6 +181,15 @@ class Scene(Spec):
     def _map_is_carried(self) -> Iterator[Fault]:
         if "Y" in self.output.fields and "map" not in [body.transport.carry for body in self.bodies]:
             yield ("output", "fields", self.output.fields.index("Y")), "Y: no body has transport.carry: map"
+
+
+def _shapes(body) -> Iterator[tuple[tuple, Any]]:
+    """The shapes of a body, each with its path."""
+    if not isinstance(body, Bubbles):
+        yield ("shape",), body.shape
+        return
+    for k, part in enumerate(body.parts):
+        yield ("parts", k, "shape"), part.shape
 
 
 def _outside(shape, box: Box) -> Iterator[Fault]:

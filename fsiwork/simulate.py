@@ -12,6 +12,7 @@ from fsiwork.build import parts
 from fsiwork.core import energy
 from fsiwork.core.flow import Flow
 from fsiwork.core.grid import Grid
+from fsiwork.core.motion import Motion
 from fsiwork.core.poisson import NotConverged
 from fsiwork.scene import Scene
 
@@ -33,6 +34,14 @@ def step(flow: Flow, bodies: tuple[Body, ...], dt: float) -> None:
         body.move(flow, dt)  # φ or Y carried by the new velocity         (3.64)
 
 
+def carry(motion: Motion, bodies: tuple[Body, ...], dt: float) -> None:
+    """Advance one Δt with a prescribed velocity."""
+    motion.begin(dt)  # its mean over the step
+    for body in bodies:
+        body.move(motion, dt)
+    motion.end(dt)
+
+
 def iterate(flow: Flow, bodies: tuple[Body, ...], dt: float, times: int) -> None:
     """One step in several passes: forces at the last pass's interface, stabiliser on the difference to its velocity."""
     before = flow.state(), [body.state() for body in bodies]
@@ -50,17 +59,22 @@ def iterate(flow: Flow, bodies: tuple[Body, ...], dt: float, times: int) -> None
         body.guess = None
 
 
-def longest_step(flow: Flow, bodies: tuple[Body, ...]) -> dict[str, float]:
+def longest_step(flow: Flow | Motion, bodies: tuple[Body, ...]) -> dict[str, float]:
     """Every limit on Δt by name [time]; infinite where nothing limits."""
+    limits = flow.longest_step() if isinstance(flow, Motion) else _of_flow(flow)
+    for body in bodies:
+        for name, limit in body.longest_step(flow).items():
+            limits[name] = min(limit, limits.get(name, math.inf))
+    return limits
+
+
+def _of_flow(flow: Flow) -> dict[str, float]:
     h, dim = flow.grid.h, flow.grid.dim
     sides = [side.velocity for pair in flow.edges.sides for side in pair if side.velocity]
     speed = sum(max(flow.largest(u), *(abs(v[a]) for v in sides), 0.0) for a, u in enumerate(flow.u))
     limits = {"advective": 0.5 * h / speed if speed > 0.0 else math.inf}
     if flow.theta == 0.0 and flow.viscosity > 0.0:
         limits["viscous"] = h**2 * flow.density / (4 * dim * flow.viscosity)  # AB2 ends at -1 on the real axis
-    for body in bodies:
-        for name, limit in body.longest_step(flow).items():
-            limits[name] = min(limit, limits.get(name, math.inf))
     return limits
 
 
@@ -81,9 +95,9 @@ class Frame:
 
 
 class Simulation:
-    """A scene in motion: flow, bodies and clock."""
+    """A scene under way: flow (or a prescribed motion), bodies and clock."""
 
-    def __init__(self, scene: Scene, flow: Flow, bodies: tuple[Body, ...]):
+    def __init__(self, scene: Scene, flow: Flow | Motion, bodies: tuple[Body, ...]):
         self.scene, self.flow, self.bodies = scene, flow, bodies
         self.passes = max((body.passes for body in bodies), default=1)
         clock = scene.clock
@@ -109,7 +123,9 @@ class Simulation:
             left = max(1, math.ceil(rest / longest - 1e-9)) if longest > 0.0 else 1
             self.dt = rest / left
         try:
-            if self.passes > 1:
+            if isinstance(self.flow, Motion):
+                carry(self.flow, self.bodies, self.dt)
+            elif self.passes > 1:
                 iterate(self.flow, self.bodies, self.dt, self.passes)
             else:
                 step(self.flow, self.bodies, self.dt)
@@ -139,14 +155,19 @@ class Simulation:
         return self.steps >= round(self.total * (self.frame_number + 1) / self.scene.clock.frames)
 
     def gauges(self) -> dict[str, float | list[float]]:
-        """Numbers of this moment: energies, power, residual of (3.23) since the last call, and what bodies measure."""
-        flow = self.flow
-        row = {"t": self.t, "dt": self.dt, "kinetic_energy": energy.kinetic_energy(flow)}
-        row |= {"dissipation": energy.dissipation(flow), "power": energy.power(flow)}
-        answers = [body.gauges(flow) for body in self.bodies]
-        for name in answers[0] if answers else ():
-            row[name] = answers[0][name] if len(answers) == 1 else [answer[name] for answer in answers]
-        total = row["kinetic_energy"] + float(np.sum(row.get("elastic_energy", 0.0)))
+        """Numbers of this moment: of a flow energies, power and residual of (3.23) since the last call, and what bodies
+        measure."""
+        fluid, answers = isinstance(self.flow, Flow), [body.gauges(self.flow) for body in self.bodies]
+        row = {"t": self.t, "dt": self.dt} | (_energies(self.flow) if fluid else {})
+        for name in dict.fromkeys(name for answer in answers for name in answer):
+            values = [answer.get(name, math.nan) for answer in answers]
+            row[name] = values[0] if len(values) == 1 else values
+        stored = sum(answer.get("elastic_energy", 0.0) for answer in answers)
+        return self._balanced(row, stored) if fluid else row
+
+    def _balanced(self, row: dict, stored: float) -> dict:
+        """The row with the residual of (3.23); ``stored``: elastic energy of all bodies."""
+        total = row["kinetic_energy"] + stored
         gain = row["power"] - row["dissipation"]
         was = self._before
         row["energy_residual"] = total - was["total"] - 0.5 * (self.t - was["t"]) * (gain + was["gain"]) if was else 0.0
@@ -266,14 +287,19 @@ def frames(
 
 
 def build(scene: Scene) -> Simulation:
-    """Flow and bodies of a scene, at t = 0."""
+    """A scene at t = 0."""
     flow, bodies = parts(scene)
     for body in bodies:
         body.blend(flow, 0.0)
     return Simulation(scene, flow, bodies)
 
 
-def vorticity(flow: Flow) -> np.ndarray:
+def _energies(flow: Flow) -> dict[str, float]:
+    kinetic, dissipation = energy.kinetic_energy(flow), energy.dissipation(flow)
+    return {"kinetic_energy": kinetic, "dissipation": dissipation, "power": energy.power(flow)}
+
+
+def vorticity(flow: Flow | Motion) -> np.ndarray:
     """∂_x v - ∂_y u at centres (in 3D the z component), interior array [1/time]."""
     g, h = flow.grid, flow.grid.h
     u, v = g.padded(flow.u[0]), g.padded(flow.u[1])

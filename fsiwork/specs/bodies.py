@@ -1,12 +1,12 @@
-"""Bodies: elastic membranes and drops, with their energy laws and numerical choices."""
+"""Bodies: elastic membranes, drops and bubbles, with their energy laws and numerical choices."""
 
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal, Protocol, runtime_checkable
+from typing import Annotated, Any, ClassVar, Literal, Protocol, runtime_checkable
 
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, TypeAdapter, WrapValidator
+from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, TypeAdapter, WrapValidator
 from pydantic_core import core_schema
 
-from fsiwork.specs.base import NotNegative, Positive, Spec, one_of, sense
+from fsiwork.specs.base import NotNegative, Number, Positive, Spec, one_of, sense, whole
 from fsiwork.specs.faults import Fault, got, wrong
 from fsiwork.specs.fluid import Inside
 from fsiwork.specs.shapes import Shape
@@ -114,4 +114,93 @@ class Membrane(Spec):
     transport: Transport = Transport()
 
 
-Body = one_of(Membrane)
+class Bubble(Spec):
+    """One of several bubbles: either its density, or in a Boussinesq fluid its buoyancy (ρ₀ − ρ)/ρ₀."""
+
+    shape: Shape
+    density: Positive | None = None
+    buoyancy: Number | None = None
+
+    @sense
+    def _one(self) -> Iterator[Fault]:
+        if (self.density is None) == (self.buoyancy is None):
+            yield (), f"give either density or buoyancy, got {'neither' if self.density is None else 'both'}"
+
+
+class Bubbles(Spec):
+    """Bubbles and drops in one level set, so that they merge; each carries its density with it (1.32)–(1.34).
+
+    ``tension`` is λ, 0 for none; ``viscosity`` belongs to the densities and counts inside all of the bubbles.
+    """
+
+    stretch: ClassVar = 1.0
+    form: ClassVar = "auto"
+    surface_mass: ClassVar = 0.0
+
+    kind: Literal["bubbles"] = "bubbles"
+    parts: Annotated[tuple[Bubble, ...], Field(min_length=1, max_length=1000)]
+    tension: NotNegative = 0.0
+    viscosity: NotNegative | None = None
+    width: Width
+    coupling: Literal["explicit", "semi-implicit", "stabilised", "iterated"] = "explicit"
+    transport: Transport = Transport()
+
+    @property
+    def boussinesq(self) -> bool:
+        """Whether the bubbles have a buoyancy in place of a density."""
+        return self.parts[0].density is None
+
+    @property
+    def energy(self) -> Linear:
+        """Surface tension as a law; its stiffness may be 0 here."""
+        return Linear.model_construct(stiffness=self.tension)
+
+    @property
+    def inside(self) -> Inside | None:
+        """The lightest of the fluids inside; nothing for bubbles with a buoyancy."""
+        if self.boussinesq:
+            return None
+        return Inside(density=min(part.density for part in self.parts), viscosity=self.viscosity)
+
+    @sense
+    def _alike(self) -> Iterator[Fault]:
+        for k, part in enumerate(self.parts):
+            if (part.density is None) != self.boussinesq:
+                yield ("parts", k), "all bubbles have a density, or all a buoyancy"
+        if self.boussinesq and self.viscosity is not None:
+            yield ("viscosity",), "bubbles with a buoyancy have the viscosity of the fluid"
+        if not self.boussinesq and self.viscosity is None:
+            yield ("viscosity",), "is required for bubbles with a density"
+
+
+class Redistance(Spec):
+    """φ becomes a distance again by a ``method`` of `fsiwork.core.redistance`, after ``every`` so many steps."""
+
+    method: Literal[
+        "pde",
+        "subcell",
+        "fast-marching-1",
+        "fast-marching-2",
+        "fast-sweeping",
+        "closest-cubic",
+        "closest-quintic",
+        "sweep",
+    ]
+    every: whole(1) = 1
+
+
+class Interface(Spec):
+    """An interface that goes with the flow and does nothing to it: a level set or a backward map."""
+
+    kind: Literal["interface"] = "interface"
+    shape: Shape
+    transport: Transport = Transport()
+    redistance: Redistance | None = None
+
+    @sense
+    def _field_to_redistance(self) -> Iterator[Fault]:
+        if self.redistance and self.transport.carry == "map":
+            yield ("redistance",), "is for transport.carry: field; a map makes φ anew each step"
+
+
+Body = one_of(Membrane, Bubbles, Interface)
