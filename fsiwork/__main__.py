@@ -147,6 +147,19 @@ def export(
 
 
 @app.command()
+def segment(
+    image: Annotated[Path, typer.Argument(metavar="IMAGE", help="A picture (.png, .jpg, …), or an array (.npy).")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT.nc", help="The file to write.")],
+    smoothing: Annotated[float, typer.Option(min=0.1, help="Radius [pixels] below which a spot is noise.")] = 2.5,
+) -> None:
+    """Part a picture or a volume of two levels by active contours, which start at its sides."""
+    with _in_one_line(ValueError):
+        from fsiwork.segmenting import to_file
+
+        typer.echo(f"{output}: {to_file(image, output, smoothing)}")
+
+
+@app.command()
 def schema(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="FILE", help="Default: to the screen.")

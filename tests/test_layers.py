@@ -16,7 +16,7 @@ LEVEL = {
     "specs": 2, "scene": 2, "targets": 2, "build": 2, "simulate": 2, "plan": 2,
     "layout": 3, "checkpoint": 3, "contour": 3, "netcdf": 3, "dataset": 3, "joining": 3, "export": 3,
     "provenance": 0,  # standard library only, so that everybody may say where a number comes from
-    "running": 4, "studies": 4, "figures": 4,
+    "running": 4, "segmenting": 4, "studies": 4, "figures": 4,
     "artefacts": 5, "__init__": 5, "__main__": 5,
 }  # fmt: skip
 DATA = {"specs", "scene", "targets"}  # what is simulated, as data: no arithmetic
