@@ -71,6 +71,7 @@ def _bubbles(spec, grid: Grid, edges: Edges) -> Bubbles:
         tension=spec.tension,
         boussinesq=spec.boussinesq,
         viscosity=spec.viscosity,
+        film=spec.film,
         coupling=spec.coupling,
         carry=spec.transport.carry,
     )

@@ -130,7 +130,8 @@ class Bubble(Spec):
 class Bubbles(Spec):
     """Bubbles and drops in one level set, so that they merge; each carries its density with it (1.32)–(1.34).
 
-    ``tension`` is λ, 0 for none; ``viscosity`` belongs to the densities and counts inside all of the bubbles.
+    ``film`` is the thickness below which a film between two of them breaks; 0: below one or two cells, by chance of the
+    grid. ``tension`` is λ, 0 for none; ``viscosity`` belongs to the densities and counts inside all of the bubbles.
     """
 
     stretch: ClassVar = 1.0
@@ -140,6 +141,7 @@ class Bubbles(Spec):
     kind: Literal["bubbles"] = "bubbles"
     parts: Annotated[tuple[Bubble, ...], Field(min_length=1, max_length=1000)]
     tension: NotNegative = 0.0
+    film: NotNegative = 0.0
     viscosity: NotNegative | None = None
     width: Width
     coupling: Literal["explicit", "semi-implicit", "stabilised", "iterated"] = "explicit"

@@ -1,0 +1,172 @@
+"""Bubbles and drops in one φ, so that they merge, each with its own density or buoyancy (1.32)-(1.34)."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from scipy import ndimage
+from scipy.spatial import cKDTree
+
+from fsiwork.bodies.laws import Linear
+from fsiwork.bodies.membrane import Membrane
+from fsiwork.core.edges import Edges
+from fsiwork.core.grid import GHOSTS, Grid
+from fsiwork.core.levelset import heaviside
+from fsiwork.core.transport import Transport
+
+TINY = 1e-300
+
+
+class Bubbles(Membrane):
+    """Several bodies of fluid inside one interface φ = 0; what each brings goes with the flow.
+
+    The density inside, or the buoyancy, is a field of its own: at first that of the nearest bubble, then carried like
+    φ; with a map it is looked up at Y. So it keeps its value away from the seams where bubbles have merged.
+
+    Parameters
+    ----------
+    grid, edges, transport, eps, coupling, carry : as in `Membrane`
+    shapes : the distances [length] of the bubbles
+    values : one number a bubble: its density, or with ``boussinesq`` its buoyancy (ρ₀ - ρ)/ρ₀, any real number
+    tension : surface tension λ ≥ 0 [force/length]; 0: the interface pulls nowhere
+    boussinesq : inertia is that of the fluid, and gravity pulls (ρ - ρ₀)g = -buoyancy ρ₀ g inside
+    film : thickness [length] below which a film between two pieces breaks: so two bubbles merge at a time that does not
+        depend on the grid. 0: φ alone decides, which merges them when the film is one or two cells thick
+    viscosity : inside all of them; belongs to the densities, None with ``boussinesq``
+
+    Attributes
+    ----------
+    content : flat field of the density or buoyancy that counts where φ < 0
+
+    Raises
+    ------
+    ValueError : not one value for every shape, or a viscosity where there is no density, or none where there is
+    """
+
+    def __init__(
+        self,
+        grid: Grid,
+        edges: Edges,
+        shapes: Sequence[Callable],
+        values: Sequence[float],
+        eps: float,
+        *,
+        transport: Transport,
+        tension: float = 0.0,
+        boussinesq: bool = False,
+        viscosity: float | None = None,
+        film: float = 0.0,
+        coupling: str = "explicit",
+        carry: str = "field",
+    ):
+        if len(shapes) != len(values) or not values:
+            raise ValueError(f"one value for every bubble: got {len(values)} for {len(shapes)}")
+        if boussinesq != (viscosity is None):
+            raise ValueError("bubbles with a density have a viscosity too, those with a buoyancy that of the fluid")
+        self.shapes, self.values = tuple(shapes), np.array(values, float)
+        self.boussinesq, self.tension, self.film = boussinesq, float(tension), float(film)
+        inside = None if boussinesq else (float(self.values.min()), viscosity)
+        super().__init__(
+            grid, edges, self._union, Linear(self.tension), eps,
+            transport=transport, coupling=coupling, carry=carry, inside=inside,
+        )  # fmt: skip
+        self.content = grid.field(transport.dtype)
+        self._look_up(self.map.home() if self.map else grid.points())
+
+    # --- verbs ------------------------------------------------------------------------------------------------
+    def blend(self, flow, dt: float) -> None:
+        """ρ = ρ₁ + (content - ρ₁)(1 - H_ε) and μ likewise; nothing for Boussinesq bubbles."""
+        if self.boussinesq:
+            return
+        rho = flow.mixture("rho")
+        rho += (self.content - rho) * self._share()
+        self.edges.fill_scalar(rho, "mirror")
+        if self.inside[1] != flow.viscosity:
+            self._mix(flow.mixture("mu"), self.inside[1], 0.0)
+
+    def push(self, flow, dt: float) -> None:
+        """Add surface tension, and the buoyancy -content ρ₀ g (1 - H_ε) to ``flow.force``."""
+        if self.tension:
+            super().push(flow, dt)
+        if self.boussinesq and any(flow.gravity):
+            lift = self.content * self._share()
+            for a, s in enumerate(self.grid.strides):
+                if flow.gravity[a]:
+                    flow.force[a][s:] -= 0.5 * flow.density * flow.gravity[a] * (lift[s:] + lift[:-s])
+
+    def move(self, flow, dt: float) -> None:
+        """Carry φ (or Y) and the content."""
+        super().move(flow, dt)
+        if self.map:
+            self._look_up(self.map.home())
+        elif self.values.min() < self.values.max():
+            self.transport.advance([self.content], flow.u, dt, "mirror")
+            np.clip(self.content, self.values.min(), self.values.max(), out=self.content)
+        if self.film:
+            self._break_films()
+
+    # --- answers ----------------------------------------------------------------------------------------------
+    def gauges(self, flow) -> dict[str, float]:
+        """Those of `Membrane`, and ``pieces``, how many connected sets of cells have φ < 0."""
+        return super().gauges(flow) | {"pieces": float(self.pieces())}
+
+    def pieces(self) -> int:
+        """Number of sets of cells with φ < 0 that are connected through faces, across periodic sides too."""
+        return np.unique(self._pieces()).size - 1
+
+    def _pieces(self) -> np.ndarray:
+        """Number of the piece of every cell, 0 outside; interior array."""
+        label, count = ndimage.label(self.grid.inside(self.phi) < 0.0)
+        name = np.arange(count + 1)
+        for a in self.grid.axes:
+            ends = label.take(0, a).ravel(), label.take(-1, a).ravel()
+            for low, high in set(zip(*ends, strict=True)) if self.edges.periodic(a) else ():
+                if low and high:
+                    name[name == name[high]] = name[low]
+        return name[label]
+
+    # --- parts ------------------------------------------------------------------------------------------------
+    def _union(self, *x):
+        return np.minimum.reduce(np.broadcast_arrays(*(distance(*x) for distance in self.shapes)))
+
+    def _break_films(self):
+        """Where two pieces come nearer than ``film``, join them by a ball half as wide again."""
+        piece = self._pieces()
+        if piece.max() <= piece[piece > 0].min(initial=piece.max()):
+            return
+        g = self.grid
+        rim = (piece > 0) & ndimage.maximum_filter(piece == 0, footprint=ndimage.generate_binary_structure(g.dim, 1))
+        name, foot = piece[rim], self._feet(rim)
+        for k in np.unique(name)[1:]:
+            one, other = foot[name == k], foot[name != k]
+            gap, nearest = cKDTree(other).query(one)
+            if gap.min() < self.film:
+                i = int(gap.argmin())
+                middle = 0.5 * (one[i] + other[nearest[i]])
+                ball = np.sqrt(sum((x - c) ** 2 for x, c in zip(g.points(), middle, strict=True))) - 0.75 * self.film
+                padded = g.padded(self.phi)
+                np.minimum(padded, ball, out=padded)
+                self.edges.fill_scalar(self.phi, "linear")
+
+    def _feet(self, rim: np.ndarray) -> np.ndarray:
+        """Points x - φ∇φ/|∇φ|² of the interface next to the cells of a mask, shape (cells, directions)."""
+        g = self.grid
+        phi, cells = g.padded(self.phi), np.nonzero(rim)
+        here = tuple(c + GHOSTS for c in cells)
+        slope = np.empty((cells[0].size, g.dim))
+        for a in g.axes:
+            e, w = (tuple(c + k * (b == a) for b, c in enumerate(here)) for k in (1, -1))
+            slope[:, a] = 0.5 * (phi[e] - phi[w]) / g.h
+        x = np.stack([g.coordinate(a)[c] for a, c in enumerate(cells)], -1)
+        return x - (phi[here] / np.maximum((slope**2).sum(1), TINY))[:, None] * slope
+
+    def _look_up(self, x):
+        nearest = np.argmin(np.broadcast_arrays(*(distance(*x) for distance in self.shapes)), axis=0)
+        self.grid.padded(self.content)[...] = self.values[nearest]
+        self.edges.fill_scalar(self.content, "mirror")
+
+    def _share(self) -> np.ndarray:
+        """1 - H_ε(φ), flat."""
+        return 1.0 - heaviside(self.phi, self.eps)
+
+    def _named(self) -> dict[str, np.ndarray]:
+        return super()._named() | {"content": self.content}
