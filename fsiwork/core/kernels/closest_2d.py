@@ -1,7 +1,7 @@
-"""Closest points in the plane: Newton's method on tensor Lagrange polynomials, seeds, their spreading through a band.
+"""Closest points in the plane: Newton's method on tensor Lagrange polynomials, seeds, and distances from both.
 
 Positions are indices of the padded array, lengths are in cells. A *seed* is the point of the line closest to a node
-next to it, with unit normal and curvature (7.1), so that any node finds its own closest point from the circle there.
+next to it, with unit normal and curvature (7.1), so that any node finds its own closest point from the parabola there.
 """
 
 import numpy as np
@@ -16,6 +16,7 @@ FREE = 3  # rounds that may change the cell: the interpolant is only continuous,
 SETTLED = 1e-6  # last step [cells]: its square is what remains
 FLAT = 0.25  # least 1 + λκ: nearer to the centre of curvature the step is not Newton's, but still downhill
 
+REACH = 2.0  # of a seed along its parabola [cells]
 SLACK = 0.5  # a seed may be farther than the linear crossing of a grid line by so much [cells]
 
 
@@ -97,32 +98,12 @@ def project(q, n, order, node, start, w):
 
 
 @serial
-def scan(q, n, out, far):
-    """Fill ``out`` with ± far by the sign of q; the nodes next to a change of sign or with q = 0. NaN in q: -1 nodes."""
-    near, count, sound = np.empty(q.size, np.int32), 0, 0.0
-    for i in range(n[0]):
-        row, below, above = q[i * n[1] :], q[max(i - 1, 0) * n[1] :], q[min(i + 1, n[0] - 1) * n[1] :]
-        o = out[i * n[1] :]
-        for j in range(n[1]):
-            o[j] = -far if row[j] < 0 else far
-            sound += 0 * row[j]
-        for j in range(n[1]):
-            minus = row[j] < 0
-            change = ((below[j] < 0) ^ minus) | ((above[j] < 0) ^ minus) | (row[j] == 0)
-            change |= ((row[max(j - 1, 0)] < 0) ^ minus) | ((row[min(j + 1, n[1] - 1)] < 0) ^ minus)
-            if change:
-                near[count] = i * n[1] + j
-                count += 1
-    return near[:count] if sound == 0 else near[:0], sound == 0
-
-
-@serial
 def seeds(q, n, near, order):
-    """Seeds of the nodes ``near``, shape (nodes, 5): x, y, normal, curvature; a normal of zero where there is none.
+    """Seeds of the nodes ``near``, shape (nodes, 6): 0, x, y, normal, curvature; a normal of zero where there is none.
 
     Newton starts at the nearest crossing of a grid line from the node, which also is the seed should it fail.
     """
-    found, w = np.zeros((near.size, 5)), np.empty((6, order + 1))
+    found, w = np.zeros((near.size, 6)), np.empty((6, order + 1))
     for k in range(near.size):
         i, j = near[k] // n[1], near[k] % n[1]
         v = q[near[k]]
@@ -136,76 +117,30 @@ def seeds(q, n, near, order):
                     best, x, y = part, i + part * di, j + part * dj
         if v == 0:
             best, x, y = 0.0, float(i), float(j)
-        found[k, 0], found[k, 1] = x, y
+        found[k, 1], found[k, 2] = x, y
         x, y, nx, ny, bend, good = project(q, n, order, (i, j), (x, y), w)
         if good and (x - i) ** 2 + (y - j) ** 2 <= (best + SLACK) ** 2:
-            found[k, 0], found[k, 1], found[k, 2], found[k, 3], found[k, 4] = x, y, nx, ny, bend
+            found[k, 1:] = x, y, nx, ny, bend
     return found
 
 
 @serial
-def spread(n, near, found, band):
-    """Nodes within the band, in rings, and the nearest seed of each node of the box (-1: none).
-
-    A queue of nodes whose seed has changed: they offer it to their four neighbours.
-    """
-    size = n[0] * n[1]
-    seed, waiting = np.full(size, -1, np.int32), np.zeros(size, np.bool_)
-    nodes, queue = np.empty(size, np.int32), np.empty(size, np.int32)
-    count = tail = near.size
-    head = 0
-    for k in range(near.size):
-        nodes[k] = queue[k] = near[k]
-        seed[near[k]] = k
-        waiting[near[k]] = True
-    tail %= size
-    held = near.size
-    while held > 0:
-        at = queue[head]
-        head = head + 1 if head + 1 < size else 0
-        held -= 1
-        waiting[at] = False
-        i, j, s = at // n[1], at % n[1], seed[at]
-        for side in range(4):
-            a, b = i + (side == 2) - (side == 0), j + (side == 3) - (side == 1)
-            if not (0 <= a < n[0] and 0 <= b < n[1]):
-                continue
-            to = a * n[1] + b
-            if seed[to] == s:
-                continue
-            far = (found[s, 0] - a) ** 2 + (found[s, 1] - b) ** 2
-            if far > band * band + 1:
-                continue
-            if seed[to] < 0:
-                nodes[count] = to
-                count += 1
-            elif far >= (found[seed[to], 0] - a) ** 2 + (found[seed[to], 1] - b) ** 2:
-                continue
-            seed[to] = s
-            if not waiting[to]:
-                waiting[to] = True
-                queue[tail] = to
-                tail = tail + 1 if tail + 1 < size else 0
-                held += 1
-    return nodes[:count].copy(), seed
-
-
-@serial
-def polish(q, n, order, nodes, seed, found, far, h, out):
-    """Distances [length] of the nodes from Newton's method, started on the circle of their seed."""
-    w = np.empty((6, order + 1))
+def distances(q, n, order, nodes, seed, found, far, h, out):
+    """Distances [length] of the nodes from the parabola of their seed; with an ``order`` > 0 Newton starts there."""
+    w = np.empty((6, max(order, 3) + 1))
     for at in nodes:
-        i, j, k = at // n[1], at % n[1], seed[at]
-        sx, sy, nx, ny, bend = found[k, 0], found[k, 1], found[k, 2], found[k, 3], found[k, 4]
-        rx, ry = i - sx, j - sy
+        k, i, j = seed[at], float(at // n[1]), float(at % n[1])
+        x, y, nx, ny, bend = found[k, 1], found[k, 2], found[k, 3], found[k, 4], found[k, 5]
+        rx, ry = i - x, j - y
         most = np.sqrt(rx * rx + ry * ry)
-        along = (ry * nx - rx * ny) / max(1 + (rx * nx + ry * ny) * bend, FLAT)
-        along = min(max(along, -1.0), 1.0)
-        fall = 0.5 * bend * along * along
-        start = sx - along * ny - fall * nx, sy + along * nx - fall * ny
-        x, y, _, _, _, good = project(q, n, order, (i, j), start, w)
-        r = np.sqrt((i - x) ** 2 + (j - y) ** 2)
-        if good and r < most:
-            most = r
+        if nx != 0 or ny != 0:
+            along = (ry * nx - rx * ny) / max(1 + (rx * nx + ry * ny) * bend, FLAT)
+            along = min(max(along, -REACH), REACH)
+            fall = 0.5 * bend * along * along
+            x, y, good = x - along * ny - fall * nx, y + along * nx - fall * ny, order == 0
+            if not good:
+                x, y, _, _, _, good = project(q, n, order, (i, j), (x, y), w)
+            if good:
+                most = min(most, np.sqrt((i - x) ** 2 + (j - y) ** 2))
         most = min(most, far) * h
         out[at] = -most if q[at] < 0 else most
