@@ -8,6 +8,11 @@ import numpy as np
 from fsiwork.core.grid import Grid
 
 METHODS: dict[str, str] = {
+    "pde": "relaxation.pde",
+    "subcell": "relaxation.subcell",
+    "fast-marching-1": "marching.fast_marching_1",
+    "fast-marching-2": "marching.fast_marching_2",
+    "fast-sweeping": "marching.fast_sweeping",
     "closest-cubic": "closest.cubic",
     "closest-quintic": "closest.quintic",
     "sweep": "closest.sweep",
