@@ -8,6 +8,7 @@ from fsiwork.bodies import laws
 from fsiwork.bodies.body import Body
 from fsiwork.bodies.bubbles import Bubbles
 from fsiwork.bodies.interface import Interface
+from fsiwork.bodies.markers import Markers, outline
 from fsiwork.bodies.membrane import Membrane
 from fsiwork.core import motion, shapes
 from fsiwork.core.edges import Edges, Side
@@ -72,6 +73,7 @@ def _bubbles(spec, grid: Grid, edges: Edges) -> Bubbles:
         boussinesq=spec.boussinesq,
         viscosity=spec.viscosity,
         film=spec.film,
+        keep_volume=spec.keep_volume,
         coupling=spec.coupling,
         carry=spec.transport.carry,
     )
@@ -94,12 +96,18 @@ def _interface(spec, grid: Grid, edges: Edges) -> Interface:
     )
 
 
+def _markers(spec, grid: Grid, edges: Edges) -> Markers:
+    bounds = spec.shape.bounds(grid.dim)
+    points = outline(shape(spec.shape).distance, bounds, spec.spacing * grid.h)
+    return Markers(grid, edges, points, _law(spec.energy), spec.stretch)
+
+
 def _law(spec) -> laws.Law:
     kind = getattr(spec, "kind", None)  # a law written in Python is the object itself
     return LAWS[kind](spec.stiffness) if kind in LAWS else spec
 
 
-BODIES = {"membrane": _membrane, "bubbles": _bubbles, "interface": _interface}
+BODIES = {"membrane": _membrane, "bubbles": _bubbles, "interface": _interface, "markers": _markers}
 LAWS = {"quadratic": laws.Quadratic, "linear": laws.Linear}
 SHAPES = {
     "ball": shapes.Ball,

@@ -10,7 +10,7 @@ from fsiwork.bodies.laws import Linear
 from fsiwork.bodies.membrane import Membrane
 from fsiwork.core.edges import Edges
 from fsiwork.core.grid import GHOSTS, Grid
-from fsiwork.core.levelset import heaviside
+from fsiwork.core.levelset import dirac, heaviside
 from fsiwork.core.transport import Transport
 
 TINY = 1e-300
@@ -31,6 +31,8 @@ class Bubbles(Membrane):
     boussinesq : inertia is that of the fluid, and gravity pulls (ρ - ρ₀)g = -buoyancy ρ₀ g inside
     film : thickness [length] below which a film between two pieces breaks: so two bubbles merge at a time that does not
         depend on the grid. 0: φ alone decides, which merges them when the film is one or two cells thick
+    keep_volume : after every step φ is shifted so that ∫1 - H_ε(φ) is what it was at first. For thin films, whose fluid
+        the bubbles swallow once a film is thinner than a cell
     viscosity : inside all of them; belongs to the densities, None with ``boussinesq``
 
     Attributes
@@ -39,7 +41,8 @@ class Bubbles(Membrane):
 
     Raises
     ------
-    ValueError : not one value for every shape, or a viscosity where there is no density, or none where there is
+    ValueError : not one value for every shape; a viscosity without a density or the reverse; ``film`` or
+        ``keep_volume`` with a map, which keeps its own shape
     """
 
     def __init__(
@@ -55,6 +58,7 @@ class Bubbles(Membrane):
         boussinesq: bool = False,
         viscosity: float | None = None,
         film: float = 0.0,
+        keep_volume: bool = False,
         coupling: str = "explicit",
         carry: str = "field",
     ):
@@ -62,6 +66,8 @@ class Bubbles(Membrane):
             raise ValueError(f"one value for every bubble: got {len(values)} for {len(shapes)}")
         if boussinesq != (viscosity is None):
             raise ValueError("bubbles with a density have a viscosity too, those with a buoyancy that of the fluid")
+        if carry == "map" and (film or keep_volume):
+            raise ValueError("only a field can be changed to break films or to keep the volume, not a map")
         self.shapes, self.values = tuple(shapes), np.array(values, float)
         self.boussinesq, self.tension, self.film = boussinesq, float(tension), float(film)
         inside = None if boussinesq else (float(self.values.min()), viscosity)
@@ -71,6 +77,7 @@ class Bubbles(Membrane):
         )  # fmt: skip
         self.content = grid.field(transport.dtype)
         self._look_up(self.map.home() if self.map else grid.points())
+        self._volume = self._sum(self._share()) if keep_volume else None
 
     # --- verbs ------------------------------------------------------------------------------------------------
     def blend(self, flow, dt: float) -> None:
@@ -103,11 +110,16 @@ class Bubbles(Membrane):
             np.clip(self.content, self.values.min(), self.values.max(), out=self.content)
         if self.film:
             self._break_films()
+        if self._volume is not None:
+            surface = self._sum(dirac(self.phi, self.eps))
+            self.phi += (self._sum(self._share()) - self._volume) / surface if surface else 0.0
 
     # --- answers ----------------------------------------------------------------------------------------------
     def gauges(self, flow) -> dict[str, float]:
-        """Those of `Membrane`, and ``pieces``, how many connected sets of cells have φ < 0."""
-        return super().gauges(flow) | {"pieces": float(self.pieces())}
+        """Those of `Membrane`, ``pieces``, and ``content``: the mean of density or buoyancy inside."""
+        share = self._share()
+        content = self._sum(share * self.content) / (self._sum(share) or np.nan)
+        return super().gauges(flow) | {"pieces": float(self.pieces()), "content": content}
 
     def pieces(self) -> int:
         """Number of sets of cells with φ < 0 that are connected through faces, across periodic sides too."""
@@ -163,6 +175,10 @@ class Bubbles(Membrane):
         nearest = np.argmin(np.broadcast_arrays(*(distance(*x) for distance in self.shapes)), axis=0)
         self.grid.padded(self.content)[...] = self.values[nearest]
         self.edges.fill_scalar(self.content, "mirror")
+
+    def _sum(self, q: np.ndarray) -> float:
+        """∫q over the box."""
+        return float(self.grid.inside(q).sum()) * self.grid.cell_volume
 
     def _share(self) -> np.ndarray:
         """1 - H_ε(φ), flat."""

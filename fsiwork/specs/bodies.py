@@ -131,7 +131,8 @@ class Bubbles(Spec):
     """Bubbles and drops in one level set, so that they merge; each carries its density with it (1.32)–(1.34).
 
     ``film`` is the thickness below which a film between two of them breaks; 0: below one or two cells, by chance of the
-    grid. ``tension`` is λ, 0 for none; ``viscosity`` belongs to the densities and counts inside all of the bubbles.
+    grid. ``keep_volume``: φ is shifted to keep their volume together, from which transport swallows thin films.
+    ``tension`` is λ, 0 for none; ``viscosity`` belongs to the densities and counts inside all of the bubbles.
     """
 
     stretch: ClassVar = 1.0
@@ -142,6 +143,7 @@ class Bubbles(Spec):
     parts: Annotated[tuple[Bubble, ...], Field(min_length=1, max_length=1000)]
     tension: NotNegative = 0.0
     film: NotNegative = 0.0
+    keep_volume: bool = False
     viscosity: NotNegative | None = None
     width: Width
     coupling: Literal["explicit", "semi-implicit", "stabilised", "iterated"] = "explicit"
@@ -171,6 +173,9 @@ class Bubbles(Spec):
                 yield ("parts", k), "all bubbles have a density, or all a buoyancy"
         if self.boussinesq and self.viscosity is not None:
             yield ("viscosity",), "bubbles with a buoyancy have the viscosity of the fluid"
+        for name in ("film", "keep_volume"):
+            if getattr(self, name) and self.transport.carry == "map":
+                yield (name,), "needs transport.carry: field"
         if not self.boussinesq and self.viscosity is None:
             yield ("viscosity",), "is required for bubbles with a density"
 
@@ -205,4 +210,17 @@ class Interface(Spec):
             yield ("redistance",), "is for transport.carry: field; a map makes φ anew each step"
 
 
-Body = one_of(Membrane, Bubbles, Interface)
+class Markers(Spec):
+    """The same elastic line by Lagrangian markers: the immersed boundary method (3.1)-(3.8), in the plane.
+
+    The shape must be star-shaped seen from the middle of its bounds; the markers lie ``spacing`` cells apart at first.
+    """
+
+    kind: Literal["markers"] = "markers"
+    shape: Shape
+    stretch: Positive = 1.0
+    energy: Energy
+    spacing: Positive = 0.5
+
+
+Body = one_of(Membrane, Bubbles, Interface, Markers)
