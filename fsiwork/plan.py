@@ -6,7 +6,7 @@ Arithmetic on the scene alone: nothing of the solver is loaded.
 import math
 from dataclasses import dataclass
 
-from fsiwork.scene import Body, Membrane, Scene, SceneError
+from fsiwork.scene import Body, Markers, Membrane, Scene, SceneError
 
 GHOSTS = 3  # as in core.grid, which this module does not load
 SHARE = 0.8  # of the available memory
@@ -127,7 +127,7 @@ def _variable(scene: Scene) -> bool:
 
 
 def _carried(body: Body, dim: int) -> int:
-    return 1 + dim * (body.transport.carry == "map")
+    return 0 if isinstance(body, Markers) else 1 + dim * (body.transport.carry == "map")
 
 
 def _fields(scene: Scene) -> list[tuple[str, int]]:
@@ -159,6 +159,8 @@ def _fields(scene: Scene) -> list[tuple[str, int]]:
 
 def _passive(i: int, body: Body, dim: int) -> list[tuple[str, int]]:
     """Fields of a body that only goes along: φ or Y, Runge-Kutta stages, velocity at the centres, φ₀(Y)."""
+    if isinstance(body, Markers):
+        return []
     carry = _carried(body, dim)
     return [(f"body {i}: φ{', Y' * (carry > 1)}", carry), (f"body {i}: stages, u at centres, scratch", 4 + dim)]
 
@@ -204,6 +206,8 @@ def _stages(scene: Scene, solvers) -> list[tuple[str, float]]:
     if _variable(scene):
         found.append(("mixture", 1.0))
     for body in scene.bodies:
+        if isinstance(body, Markers):
+            continue
         carry = _carried(body, scene.box.dim)
         found.append(("transport of a field", float(carry - 1 or 1)))
         if carry > 1:
@@ -244,18 +248,19 @@ def _step(scene: Scene) -> float:
         limits.append(0.5 * h / speed)
     if fluid and fluid.diffusion == "explicit" and fluid.viscosity > 0:
         limits.append(h**2 * fluid.density / (4 * scene.box.dim * fluid.viscosity))
-    for _, body in _membranes(scene):
-        tension = _tension(body)
+    for body in scene.bodies:
+        tension = _tension(body) if isinstance(body, Membrane | Markers) else 0.0
         if tension > 0:
-            rho = min(fluid.density, body.inside.density) if body.inside else fluid.density
-            mu = min(fluid.viscosity, body.inside.viscosity) if body.inside else fluid.viscosity
-            eps = body.width.of(h)
+            inside = getattr(body, "inside", None)
+            rho = min(fluid.density, inside.density) if inside else fluid.density
+            mu = min(fluid.viscosity, inside.viscosity) if inside else fluid.viscosity
+            eps = 2.0 * h if isinstance(body, Markers) else body.width.of(h)
             limit = (mu * eps + math.hypot(mu * eps, math.sqrt(0.5 * tension * rho * eps) * h)) / tension
-            limits.append(limit * (1.0 if body.coupling == "explicit" else 4.0))
+            limits.append(limit * (1.0 if getattr(body, "coupling", "explicit") == "explicit" else 4.0))
     return min(scene.clock.end, scene.clock.safety * min(limits))
 
 
-def _tension(body: Membrane) -> float:
+def _tension(body: Membrane | Markers) -> float:
     """s E'(s) and for a hardly stretched membrane its modulus, at the first stretch s."""
     s, law = body.stretch, body.energy
     kind = getattr(law, "kind", "")

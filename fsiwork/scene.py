@@ -20,6 +20,7 @@ from fsiwork.specs.bodies import (
     Interface,
     Law,
     Linear,
+    Markers,
     Membrane,
     Quadratic,
     Redistance,
@@ -50,9 +51,9 @@ from fsiwork.specs.yaml import Loader
 __all__ = [
     "Ball", "Block", "Body", "Box", "Bubble", "Bubbles", "Capsule", "Cassini", "Clock", "Deformation", "Edges",
     "Ellipsoid", "Energy", "Fluid", "FreeSlip", "Inflow", "Inside", "Interface", "Intersection", "Law", "Linear",
-    "Membrane", "Minus", "Motion", "Moved", "NoSlip", "Outflow", "Output", "Periodic", "Polygon", "Quadratic",
-    "Redistance", "Rest", "Rotation", "Scene", "SceneError", "Shape", "Shear", "Side", "Slot", "TaylorGreen", "Torus",
-    "Translation", "Transport", "Union", "Vortex", "Wall", "Width", "faults", "load", "loads",
+    "Markers", "Membrane", "Minus", "Motion", "Moved", "NoSlip", "Outflow", "Output", "Periodic", "Polygon",
+    "Quadratic", "Redistance", "Rest", "Rotation", "Scene", "SceneError", "Shape", "Shear", "Side", "Slot",
+    "TaylorGreen", "Torus", "Translation", "Transport", "Union", "Vortex", "Wall", "Width", "faults", "load", "loads",
 ]  # fmt: skip
 
 
@@ -152,14 +153,17 @@ class Scene(Spec):
         for i, body in enumerate(self.bodies):
             yield from tried(self._shape_fits(i, body))
             if not isinstance(body, Interface):
-                yield from tried(self._width_fits(i, body))
                 yield from tried(self._has_a_fluid(i, body))
+            if not isinstance(body, Interface | Markers):
+                yield from tried(self._width_fits(i, body))
 
     def _has_a_fluid(self, i: int, body) -> Iterator[Fault]:
         if self.motion is not None:
             yield ("bodies", i, "kind"), f"{body.kind} needs a fluid; with a motion go bodies of kind interface"
 
     def _shape_fits(self, i: int, body) -> Iterator[Fault]:
+        if isinstance(body, Markers) and self.box.dim != 2:
+            yield ("bodies", i, "kind"), f"markers are for two directions, the box has {self.box.dim}"
         for where, shape in _shapes(body):
             misfits = list(shape.misfits(self.box.dim))
             for path, text in misfits or _outside(shape, self.box):
@@ -179,7 +183,9 @@ class Scene(Spec):
 
     @sense
     def _map_is_carried(self) -> Iterator[Fault]:
-        if "Y" in self.output.fields and "map" not in [body.transport.carry for body in self.bodies]:
+        if "Y" in self.output.fields and "map" not in [
+            body.transport.carry for body in self.bodies if not isinstance(body, Markers)
+        ]:
             yield ("output", "fields", self.output.fields.index("Y")), "Y: no body has transport.carry: map"
 
 
