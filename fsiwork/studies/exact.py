@@ -11,6 +11,9 @@ from scipy.optimize import least_squares
 from scipy.optimize import newton as secant
 from scipy.special import ellipe, ive, kve
 
+from fsiwork.core.markers import Line, carry, circle
+from fsiwork.core.motion import Vortex
+
 # Ghia, Ghia and Shin (1982): u on the vertical mid-line of the lid-driven cavity (lid y = 1 moves with u = 1).
 GHIA_Y = (0.9766, 0.9531, 0.8516, 0.7344, 0.6172, 0.5, 0.4531, 0.2813, 0.1719, 0.1016, 0.0547)
 GHIA_U = {
@@ -54,6 +57,28 @@ def cavity(reynolds: int) -> tuple[np.ndarray, np.ndarray]:
     Raises KeyError for another Reynolds number.
     """
     return np.array(GHIA_Y), np.array(GHIA_U[reynolds])
+
+
+def stretched_blob(times: tuple[float, ...], longest: float = 0.01) -> list[Line]:
+    """The line of Figs 1.5 and 1.6 at increasing ``times``: the circle about (1/2, 3/4), radius 0.15, in the vortex
+    u = (-sin²πx sin 2πy, sin 2πx sin²πy) of the unit square, by markers at most ``longest`` apart.
+
+    ``length_and_area()`` of each: with the default relative errors below 1e-7 and 1e-8 up to t = 5.
+    """
+    vortex, line, now, lines = (
+        Vortex((0.0, 0.0), (1.0, 1.0)),
+        circle((0.5, 0.75), 0.15, max(32, int(1 / longest)), False),
+        0.0,
+        [],
+    )
+    for time in times:
+        steps = int(np.ceil((time - now) / (0.5 * longest) - 1e-9))
+        for k in range(steps):
+            dt = (time - now) / steps
+            line = carry(line, lambda x, t: np.stack(vortex.velocity(*x)), now + k * dt, dt).split(longest, 0.3)
+        now = time
+        lines.append(line.split(longest, 0.3))
+    return lines
 
 
 def ellipse_perimeter(a: float, b: float) -> float:
