@@ -11,6 +11,7 @@ import numpy as np
 
 from fsiwork.core.grid import Grid
 from fsiwork.core.kernels import marching as kernels
+from fsiwork.core.relaxation import beside
 
 WALLS = 2  # second-order differences read two nodes on
 ROUNDS = 20  # of fast sweeping; two do without obstacles, bends of the characteristics ask for more
@@ -18,20 +19,23 @@ ROUNDS = 20  # of fast sweeping; two do without obstacles, bends of the characte
 
 def fast_marching_1(grid: Grid, phi: np.ndarray, band: float | None) -> np.ndarray:
     """Sethian's fast marching with first-order differences; error O(Δx) at and near the interface."""
-    return _redistance(grid, phi, band, lambda *nodes: _march(False, band, *nodes))
+    return _redistance(grid, phi, band, _linear, lambda *nodes: _march(False, band, *nodes))
 
 
 def fast_marching_2(grid: Grid, phi: np.ndarray, band: float | None) -> np.ndarray:
-    """Fast marching with second-order differences; a node across the interface counts with its sign."""
-    return _redistance(grid, phi, band, lambda *nodes: _march(True, band, *nodes))
+    """Fast marching with second-order differences from the distances of `relaxation.beside`, of second order too.
+
+    A node across the interface counts with its sign.
+    """
+    return _redistance(grid, phi, band, _parted, lambda *nodes: _march(True, band, *nodes))
 
 
 def fast_sweeping(grid: Grid, phi: np.ndarray, band: float | None) -> np.ndarray:
     """Zhao's fast sweeping with first-order differences, until nothing moves; ``band`` only cuts the values."""
-    return _redistance(grid, phi, band, _sweep)
+    return _redistance(grid, phi, band, _linear, _sweep)
 
 
-def _redistance(grid, phi, band, spread):
+def _redistance(grid, phi, band, seeds, spread):
     """Signed distances [length]; nodes beyond ``band``, all of them without an interface, get the farthest there is."""
     if not np.isfinite(phi).all():
         return np.full_like(phi, np.nan)
@@ -42,12 +46,26 @@ def _redistance(grid, phi, band, spread):
     strides = np.array([int(np.prod(q.shape[a + 1 :])) for a in grid.axes])
     farthest = math.hypot(*q.shape) if band is None else float(band)
     d = np.full(q.shape, np.inf)
-    front = _front(q, state)
-    kernels.linear_seeds(q.ravel(), d.ravel(), state.ravel(), strides, front)
+    front = seeds(grid, q, d, state, strides)
     if front.size:
         spread(q, d, state, strides, front)
     out = np.copysign(np.minimum(d[inner], farthest) * grid.h, q[inner])
     return out.ravel().astype(phi.dtype, copy=False)
+
+
+def _linear(grid, q, d, state, strides):
+    front = _front(q, state)
+    kernels.linear_seeds(q.ravel(), d.ravel(), state.ravel(), strides, front)
+    return front
+
+
+def _parted(grid, q, d, state, strides):
+    inner = np.ascontiguousarray(q[(slice(WALLS, -WALLS),) * grid.dim]).ravel()
+    nodes, distances = beside(grid, inner)
+    index = np.unravel_index(nodes, grid.shape)
+    front = np.ravel_multi_index(tuple(i + WALLS for i in index), q.shape)
+    d.ravel()[front], state.ravel()[front] = np.abs(distances), kernels.SEED
+    return front
 
 
 def _front(q, state):

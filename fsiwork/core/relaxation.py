@@ -30,28 +30,36 @@ def pde(grid: Grid, phi: np.ndarray, band: float | None, edges: Edges | None = N
 def subcell(grid: Grid, phi: np.ndarray, band: float | None, edges: Edges | None = None) -> np.ndarray:
     """(1.36) with the fix of Russo and Smereka: nodes next to the interface take their distance from φ₀ alone.
 
-    There D = φ₀/|∇φ₀| is held in every stage (where their relaxation would end), elsewhere S = ±1. Arguments
-    as for `pde`. Holding D is stable however often it is repeated.
+    There the distance of `beside` is held in every stage (where their relaxation would end), elsewhere S = ±1.
+    Arguments as for `pde`. Stable however often it is repeated: gradients at the nodes themselves are not, they
+    see the smoothing on the way out and add it to the ripple of the interface.
     """
     return _redistance(grid, phi, band, edges, _held)
 
 
 def renormalised(grid: Grid, phi: np.ndarray) -> np.ndarray:
-    """φ/|∇φ| (1.5.2): the distance to second order near the interface, at the price of one gradient; flat field [length].
+    """φ/|∇φ| (1.5.2), flat field [length]: second order near the interface, at the price of one gradient.
 
-    On the cells and one ghost layer (zero elsewhere); at most the diagonal of the box where φ is flat.
+    At most the diagonal of the box, which stands where φ is flat and in the ghosts beyond the first layer.
     """
-    farthest = math.hypot(*grid.length)
-    slope = gradient_norm(grid, phi)
-    out = np.zeros_like(phi)
-    np.divide(phi, slope, out=out, where=slope > np.abs(phi) / farthest)
-    flat = slope <= np.abs(phi) / farthest
-    start, n = grid.rows(1, 1)
-    inside = np.zeros(grid.size, bool)
-    inside[np.add.outer(start, np.arange(n)).ravel()] = True
-    flat &= inside
-    out[flat] = np.sign(phi[flat]) * farthest
-    return out
+    slope = np.maximum(gradient_norm(grid, phi), np.abs(phi) / phi.dtype.type(math.hypot(*grid.length)))
+    return np.divide(phi, slope, out=np.zeros_like(phi), where=slope > 0)
+
+
+def beside(grid: Grid, phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Flat indices of the corners of all cells of nodes that the interface crosses, and their distances φ/|∇φ| [cells].
+
+    |∇φ| is the mean over the crossed cells at the corner, so that both sides of a crossing see almost the same
+    slope and the zero stays. Ghosts count; at most the diagonal of a cell, second order.
+    """
+    cells, slope = _crossed(grid, phi)
+    offsets, _ = _corners(grid)
+    corners = (cells[:, None] + offsets).ravel()
+    count = np.bincount(corners, minlength=grid.size)
+    total = np.bincount(corners, np.repeat(slope, len(offsets)), minlength=grid.size)
+    nodes = np.flatnonzero(count)
+    reach = math.sqrt(grid.dim)
+    return nodes, np.clip(phi[nodes] * (count[nodes] / total[nodes]), -reach, reach)
 
 
 def _redistance(grid, phi, band, edges, begin):
@@ -59,12 +67,11 @@ def _redistance(grid, phi, band, edges, begin):
         return np.full_like(phi, np.nan)
     edges = edges or Edges(grid, ((Side("outflow"),) * 2,) * grid.dim)
     q = phi.astype(np.float64)
-    cells, slope = _crossed(grid, q)
+    _, slope = _crossed(grid, q)
     steep = np.median(slope) if slope.size else np.abs(q).max()
     if steep > 0:
         q /= steep
-        slope /= steep
-    q, sign = begin(grid, q, cells, slope)
+    q, sign = begin(grid, q)
     q = _iterate(grid, edges, q, sign, ITERATIONS if band is None else math.ceil(band / STEP) + 2)
     if band is not None:
         np.clip(q, -band, band, out=q)
@@ -96,20 +103,16 @@ def _crossed(grid, q):
     return cells, np.maximum(slope, SADDLE * np.ptp(values, axis=1))
 
 
-def _smoothed(grid, q, cells, slope):
+def _smoothed(grid, q):
     width = np.hypot(q, grid.h * gradient_norm(grid, q))
     return q, np.divide(q, width, out=np.zeros_like(q), where=width > 0)
 
 
-def _held(grid, q, cells, slope):
-    offsets, _ = _corners(grid)
-    total, count = np.zeros(grid.size), np.zeros(grid.size)
-    for offset in offsets:
-        np.add.at(total, cells + offset, slope)
-        np.add.at(count, cells + offset, 1)
-    held = count > 0
-    q[held] *= count[held] / total[held]
-    return q, np.where(held, 0.0, np.sign(q))
+def _held(grid, q):
+    nodes, distances = beside(grid, q)
+    q, sign = q.copy(), np.sign(q)
+    q[nodes], sign[nodes] = distances, 0.0
+    return q, sign
 
 
 def _iterate(grid, edges, q, sign, iterations):

@@ -18,7 +18,7 @@ serial = njit(error_model="numpy", cache=True)
 
 @point
 def solve(t, w, m):
-    """Largest root u of Σ w² (u - t)² = 1 over the first m axes; the axes with t ≥ u are left out. Sorts ``t``, ``w``."""
+    """Largest root u of Σ w² (u - t)² = 1 over the first m axes, without those with t ≥ u. Sorts ``t`` and ``w``."""
     for i in range(1, m):
         for j in range(i, 0, -1):
             if t[j] < t[j - 1]:
