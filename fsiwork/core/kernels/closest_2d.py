@@ -125,9 +125,10 @@ def seeds(q, n, near, order):
 
 
 @serial
-def distances(q, n, order, nodes, seed, found, far, h, out):
-    """Distances [length] of the nodes from the parabola of their seed; with an ``order`` > 0 Newton starts there."""
-    w = np.empty((6, max(order, 3) + 1))
+def distances(q, n, order, polished, nodes, seed, found, out):
+    """Distances of the nodes [cells], at most what stands in ``out``, from the parabola of their seed; at ``polished``
+    cells or less of the seed by Newton's method that starts there."""
+    w = np.empty((6, order + 1))
     for at in nodes:
         k, i, j = seed[at], float(at // n[1]), float(at % n[1])
         x, y, nx, ny, bend = found[k, 1], found[k, 2], found[k, 3], found[k, 4], found[k, 5]
@@ -137,10 +138,10 @@ def distances(q, n, order, nodes, seed, found, far, h, out):
             along = (ry * nx - rx * ny) / max(1 + (rx * nx + ry * ny) * bend, FLAT)
             along = min(max(along, -REACH), REACH)
             fall = 0.5 * bend * along * along
-            x, y, good = x - along * ny - fall * nx, y + along * nx - fall * ny, order == 0
+            x, y, good = x - along * ny - fall * nx, y + along * nx - fall * ny, most > polished
             if not good:
                 x, y, _, _, _, good = project(q, n, order, (i, j), (x, y), w)
             if good:
                 most = min(most, np.sqrt((i - x) ** 2 + (j - y) ** 2))
-        most = min(most, far) * h
+        most = min(most, abs(out[at]))
         out[at] = -most if q[at] < 0 else most

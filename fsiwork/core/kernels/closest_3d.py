@@ -213,9 +213,10 @@ def away(a, b):
 
 
 @serial
-def distances(q, n, order, nodes, seed, found, far, h, out):
-    """Distances [length] of the nodes from the paraboloid of their seed; with an ``order`` > 0 Newton starts there."""
-    w, d = np.empty((3, 3, max(order, 3) + 1)), np.empty(10)
+def distances(q, n, order, polished, nodes, seed, found, out):
+    """Distances of the nodes [cells], at most what stands in ``out``, from the paraboloid of their seed; at
+    ``polished`` cells or less of the seed by Newton's method that starts there."""
+    w, d = np.empty((3, 3, order + 1)), np.empty(10)
     for at in nodes:
         node, k = position(at, n), seed[at]
         y = found[k, 0], found[k, 1], found[k, 2]
@@ -229,10 +230,10 @@ def distances(q, n, order, nodes, seed, found, far, h, out):
             b, c = cut * b, cut * c
             fall = -0.5 * (form[0] * b * b + 2 * form[1] * b * c + form[2] * c * c)
             y = moved(y, u, e, f, (fall, b, c), 1.0)
-            good = order == 0
+            good = most > polished
             if not good:
                 y, u, form, good = project(q, n, order, node, y, w, d)
             if good:
                 most = min(most, away(node, y))
-        most = min(most, far) * h
+        most = min(most, abs(out[at]))
         out[at] = -most if q[at] < 0 else most

@@ -72,7 +72,7 @@ def along(seed, at, count, step, p, i, j, k):
 
 @point
 def across(seed, at, count, back, p, i, j):
-    """Each of ``count`` nodes from ``at`` = (i, j, 0) on takes the seed of the node ``back`` from it if that is nearer."""
+    """Each of ``count`` nodes from ``at`` = (i, j, 0) on takes the seed of the node ``back`` from it if nearer."""
     for k in range(count):
         own, other = seed[at + k], seed[at + k + back]
         gain = (p[own, 0] - i) ** 2 - (p[other, 0] - i) ** 2 + ((p[own, 1] - j) ** 2 - (p[other, 1] - j) ** 2)
