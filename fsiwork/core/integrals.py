@@ -11,7 +11,7 @@ import numpy as np
 
 from fsiwork.core import levelset
 from fsiwork.core.grid import GHOSTS, Grid
-from fsiwork.core.kernels import heights, integrals
+from fsiwork.core.kernels import heights, integrals, volumes
 
 
 def _plane(grid: Grid, phi: np.ndarray) -> np.ndarray:
@@ -69,11 +69,25 @@ def length(grid: Grid, phi: np.ndarray, method: str = "geometric") -> float:
 def length_and_area(grid: Grid, phi: np.ndarray) -> tuple[float, float]:
     """Length of φ = 0 [length] and area of φ < 0 [length²], sixth order where φ is smooth.
 
-    Over all from the first ghosts' centres to the last ones', half a cell more than the box on each side: for closed
-    lines inside the box. Raises ValueError outside the plane.
+    In the box and no further: exact across a periodic side; beside others as good as the ghosts of φ, of which all
+    three are read. Raises ValueError outside the plane.
     """
     q = _plane(grid, phi)
     if not np.isfinite(q).all():
         return math.nan, math.nan
     line, area = heights.length_and_area(q, GHOSTS - 1, grid.h)
     return float(line), float(area)
+
+
+def area_and_volume(grid: Grid, phi: np.ndarray) -> tuple[float, float]:
+    """Area of the surface φ = 0 [length²] and volume of φ < 0 [length³], sixth order where φ is smooth.
+
+    In the box and no further; φ is read in all three ghosts. Raises ValueError unless in space.
+    """
+    if grid.dim != 3:
+        raise ValueError(f"areas are those of surfaces in space, got {grid.dim} directions")
+    q = np.ascontiguousarray(grid.padded(phi), dtype=np.float64)
+    if not np.isfinite(q).all():
+        return math.nan, math.nan
+    surface, volume = volumes.area_and_volume(q, GHOSTS - 1, grid.h)
+    return float(surface), float(volume)

@@ -12,78 +12,23 @@ import numpy as np
 from numba import njit
 
 from fsiwork.core.kernels import FASTMATH, point
+from fsiwork.core.kernels.quintic import (
+    HALVES,
+    LEVEL,
+    POWERS,
+    STEEP,
+    TO_COEFFICIENTS,
+    N,
+    bounds,
+    bracketed,
+    horner,
+    roots,
+)
 
 serial = njit(error_model="numpy", fastmath=FASTMATH, cache=True)
 
-N = 6  # coefficients in a direction
 DEPTH = 5
-STEEP = 0.5  # smallest |∂σ|/|∂τ| for a graph over τ: the integrand stays tame
-
-NODES = np.arange(N) - 2.5
-TO_COEFFICIENTS = np.linalg.inv(NODES[:, None] ** np.arange(N))
-HALVES = np.array(
-    [
-        [[math.comb(j, k) * (side * 0.25) ** (j - k) * 0.5**k if j >= k else 0.0 for j in range(N)] for k in range(N)]
-        for side in (-1, 1)
-    ]
-)
-"""Coefficients on the lower and the upper half of an interval from those on all of it."""
 GAUSS, WEIGHTS = (0.5 * q for q in np.polynomial.legendre.leggauss(5))
-POWERS = 0.5 ** np.arange(N)
-
-
-@point
-def horner(p, x):
-    """Polynomial and its derivative."""
-    value, slope = p[N - 1], 0.0
-    for k in range(N - 2, -1, -1):
-        slope = slope * x + value
-        value = value * x + p[k]
-    return value, slope
-
-
-@point
-def bracketed(p, a, b, below):
-    """The root of p in [a, b], over whose ends it changes its sign; ``below``: p(a) ≤ 0. Newton, kept inside."""
-    x = 0.5 * (a + b)
-    for _ in range(60):
-        value, slope = horner(p, x)
-        if (value <= 0) == below:
-            a = x
-        else:
-            b = x
-        new = x - value / slope if slope != 0 else a
-        if not a <= new <= b:
-            new = 0.5 * (a + b)
-        if abs(new - x) < 1e-16:
-            break
-        x = new
-    return x
-
-
-@point
-def roots(p, found, work):
-    """All roots of p in [-1/2, 1/2] in order, their number: between two of them lies one of the derivative."""
-    count = 0
-    for order in range(N - 2, -1, -1):  # the derivative of this order
-        for k in range(N):
-            factor = 1.0
-            for m in range(order):
-                factor *= k + order - m
-            work[0, k] = factor * p[k + order] if k + order < N else 0.0
-        for k in range(count):
-            work[1, k] = found[k]
-        work[1, count] = 0.5
-        ends, count, a = count + 1, 0, -0.5
-        below = horner(work[0], a)[0] <= 0
-        for k in range(ends):
-            b = work[1, k]
-            other = horner(work[0], b)[0] <= 0
-            if below != other:
-                found[count] = bracketed(work[0], a, b, below)
-                count += 1
-            a, below = b, other
-    return count
 
 
 @point
@@ -104,30 +49,25 @@ def change(a, q, b, work, out):
 
 
 @point
-def bounds(c):
-    """Bounds over the cell: |ψ - c₀₀| at most, |∂σψ| at least and at most, |∂τψ| at least and at most."""
-    spread = along = across = 0.0
-    for k in range(N):
-        for l in range(N):
-            size = abs(c[k, l]) * POWERS[k] * POWERS[l]
-            if k + l > 0:
-                spread += size
-            along += 2 * k * size
-            across += 2 * l * size
-    x, y = abs(c[1, 0]), abs(c[0, 1])
-    return spread, 2 * x - along, along, 2 * y - across, across
+def side(c, at, out):
+    """out = the polynomial where σ is ``at``."""
+    size = 0.0
+    for l in range(N):
+        value = c[N - 1, l]
+        for k in range(N - 2, -1, -1):
+            value = value * at + c[k, l]
+        out[l] = value
+        size += abs(value) * POWERS[l]
+    if size <= LEVEL * abs(c[1, 0]):
+        out[:N] = 0.0
 
 
 @point
 def graph(c, work, found, total):
     """Adds (length, inside) of a unit cell in which the line is σ(τ) to ``total``."""
     p, tilt, low, high = work[2], work[3], work[4], work[5]
-    for l in range(N):
-        low[l] = high[l] = 0.0
-        for k in range(N):
-            value = c[k, l] * POWERS[k]
-            low[l] += -value if k % 2 else value
-            high[l] += value
+    side(c, -0.5, low)
+    side(c, 0.5, high)
     count = roots(low, found, work)
     count += roots(high, found[count:], work)
     found[:count].sort()
@@ -190,49 +130,72 @@ def candidates(flag, m, o, p, q):
         both = (max(max(a, b), max(c, d)) > 0) & (min(min(a, b), min(c, d)) <= 0)
         x = max(max(bend(m[j + 2], a, b), bend(a, b, q[j + 2])), max(bend(m[j + 3], c, d), bend(c, d, q[j + 3])))
         y = max(max(bend(o[j + 1], a, c), bend(a, c, o[j + 4])), max(bend(p[j + 1], b, d), bend(b, d, p[j + 4])))
-        flag[j] = both | (least <= x + y)
+        span = max(max(a, b), max(c, d)) - min(min(a, b), min(c, d))
+        flag[j] = both | (least <= x + y + 10 * LEVEL * span)
         full += (a <= 0) & (not flag[j])
     return full
 
 
+@point
+def divide(c, stack, top, first, last, work):
+    """Puts those of the four parts of a cell on the stack that lie in the halves first[a] to last[a]."""
+    for a in range(first[0], last[0] + 1):
+        for b in range(first[1], last[1] + 1):
+            change(HALVES[a], c, HALVES[b], work, stack[top])
+            top += 1
+    return top
+
+
+@point
+def cell(stack, top, size, depth, scratch, total):
+    """Adds (length, inside), in units of the cell's side, of the ``top`` parts on the stack to ``total``."""
+    c, work, found, part = scratch
+    while top > 0:
+        top -= 1
+        length, deep = size[top], depth[top]
+        c[:] = stack[top]
+        spread, least_x, most_x, least_y, most_y = bounds(c)
+        part[:] = 0
+        if abs(c[0, 0]) > spread * (1 + LEVEL):
+            part[1] = 1.0 if c[0, 0] <= 0 else 0.0
+        elif least_x > STEEP * most_y:
+            graph(c, work, found, part)
+        elif least_y > STEEP * most_x:
+            for k in range(N):
+                for l in range(k):
+                    c[k, l], c[l, k] = c[l, k], c[k, l]
+            graph(c, work, found, part)
+        elif deep == DEPTH:
+            straight(c, part)
+        else:
+            size[top : top + 4], depth[top : top + 4] = 0.5 * length, deep + 1
+            top = divide(c, stack, top, (0, 0), (1, 1), work)
+        total[0] += part[0] * length
+        total[1] += part[1] * length * length
+
+
 @serial
 def length_and_area(q, low, h):
-    """Length of φ = 0 and area of φ < 0 over the cells between nodes [low, n - low); ``low`` is 2 or more."""
+    """Length of φ = 0 and area of φ < 0 over the cells between nodes [low, n - low), of those at the ends the inner
+    halves: the box whose sides lie midway between the nodes low and low + 1. ``low`` is 2 or more."""
     stack, size = np.empty((4 * DEPTH + 4, N, N)), np.empty(4 * DEPTH + 4)
-    depth = np.empty(4 * DEPTH + 4, np.int64)
-    work, found, total, part = np.empty((N, N + 2)), np.empty(2 * N), np.zeros(2), np.empty(2)
-    c, flag = np.empty((N, N)), np.empty(q.shape[1] - 2 * low - 1, np.bool_)
-    full = 0
-    for i in range(low, q.shape[0] - low - 1):
-        full += candidates(flag, q[i - 1, low - 2 :], q[i, low - 2 :], q[i + 1, low - 2 :], q[i + 2, low - 2 :])
-        for j in range(low, q.shape[1] - low - 1):
+    depth, total = np.empty(4 * DEPTH + 4, np.int64), np.zeros(2)
+    c, work, found, part = np.empty((N, N)), np.empty((N, N + 2)), np.empty(2 * N + 1), np.empty(2)
+    a, b, flag = q.shape[0] - low - 2, q.shape[1] - low - 2, np.empty(q.shape[1] - 2 * low - 1, np.bool_)
+    full = 0.0
+    for i in range(low, a + 1):
+        count = candidates(flag, q[i - 1, low - 2 :], q[i, low - 2 :], q[i + 1, low - 2 :], q[i + 2, low - 2 :])
+        ends = ((q[i, low] <= 0) & (not flag[0])) + ((q[i, b] <= 0) & (not flag[b - low]))
+        full += (count - 0.5 * ends) * (0.5 if i in (low, a) else 1.0)
+        for j in range(low, b + 1):
             if not flag[j - low]:
                 continue
             change(TO_COEFFICIENTS, q[i - 2 : i + 4, j - 2 : j + 4], TO_COEFFICIENTS, work, stack[0])
             size[0], depth[0], top = 1.0, 0, 1
-            while top > 0:
-                top -= 1
-                side, deep = size[top], depth[top]
-                c[:] = stack[top]
-                spread, least_x, most_x, least_y, most_y = bounds(c)
-                part[:] = 0
-                if abs(c[0, 0]) > spread:
-                    part[1] = 1.0 if c[0, 0] <= 0 else 0.0
-                elif least_x > STEEP * most_y:
-                    graph(c, work, found, part)
-                elif least_y > STEEP * most_x:
-                    for k in range(N):
-                        for l in range(k):
-                            c[k, l], c[l, k] = c[l, k], c[k, l]
-                    graph(c, work, found, part)
-                elif deep == DEPTH:
-                    straight(c, part)
-                else:
-                    for a in range(2):
-                        for b in range(2):
-                            change(HALVES[a], c, HALVES[b], work, stack[top])
-                            size[top], depth[top] = 0.5 * side, deep + 1
-                            top += 1
-                total[0] += part[0] * side
-                total[1] += part[1] * side * side
+            if i in (low, a) or j in (low, b):
+                c[:] = stack[0]
+                size[:4], depth[:4] = 0.5, 1
+                first, last = (int(i == low), int(j == low)), (1 - int(i == a), 1 - int(j == b))
+                top = divide(c, stack, 0, first, last, work)
+            cell(stack, top, size, depth, (c, work, found, part), total)
     return total[0] * h, (total[1] + full) * h * h
