@@ -52,7 +52,7 @@ class Contours:
     ValueError : the image has another shape or is not finite, or a number is not positive.
     """
 
-    def __init__(self, grid: Grid, image: np.ndarray, smoothing: float, eps: float, method: str = "closest-cubic"):
+    def __init__(self, grid: Grid, image: np.ndarray, smoothing: float, eps: float, method: str = "fast-sweeping"):
         if image.shape != grid.n or not np.isfinite(image).all():
             raise ValueError(f"the image must be finite and of shape {grid.n}, got {image.shape}")
         if not (smoothing > 0 and eps > 0):
