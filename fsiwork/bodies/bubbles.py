@@ -10,6 +10,7 @@ from fsiwork.bodies.laws import Linear
 from fsiwork.bodies.membrane import Membrane
 from fsiwork.core.edges import Edges
 from fsiwork.core.grid import GHOSTS, Grid
+from fsiwork.core.integrals import area_and_volume, length_and_area
 from fsiwork.core.levelset import dirac, heaviside
 from fsiwork.core.transport import Transport
 
@@ -31,8 +32,8 @@ class Bubbles(Membrane):
     boussinesq : inertia is that of the fluid, and gravity pulls (ρ - ρ₀)g = -buoyancy ρ₀ g inside
     film : thickness [length] below which a film between two pieces breaks: so two bubbles merge at a time that does not
         depend on the grid. 0: φ alone decides, which merges them when the film is one or two cells thick
-    keep_volume : after every step φ is shifted so that ∫1 - H_ε(φ) is what it was at first. For thin films, whose fluid
-        the bubbles swallow once a film is thinner than a cell
+    keep_volume : after every step φ is shifted so that the volume of φ < 0 is what it was at first. For thin films,
+        whose fluid the bubbles swallow once a film is thinner than a cell
     viscosity : inside all of them; belongs to the densities, None with ``boussinesq``
 
     Attributes
@@ -77,7 +78,7 @@ class Bubbles(Membrane):
         )  # fmt: skip
         self.content = grid.field(transport.dtype)
         self._look_up(self.map.home() if self.map else grid.points())
-        self._volume = self._sum(self._share()) if keep_volume else None
+        self._volume = self.volume() if keep_volume else None
 
     # --- verbs ------------------------------------------------------------------------------------------------
     def blend(self, flow, dt: float) -> None:
@@ -112,14 +113,20 @@ class Bubbles(Membrane):
             self._break_films()
         if self._volume is not None:
             surface = self._sum(dirac(self.phi, self.eps))
-            self.phi += (self._sum(self._share()) - self._volume) / surface if surface else 0.0
+            self.phi += (self.volume() - self._volume) / surface if surface else 0.0
 
     # --- answers ----------------------------------------------------------------------------------------------
     def gauges(self, flow) -> dict[str, float]:
-        """Those of `Membrane`, ``pieces``, and ``content``: the mean of density or buoyancy inside."""
+        """Those of `Membrane`, its volume by `volume`; ``pieces``; ``content``: mean density or buoyancy inside."""
         share = self._share()
         content = self._sum(share * self.content) / (self._sum(share) or np.nan)
-        return super().gauges(flow) | {"pieces": float(self.pieces()), "content": content}
+        own = {"volume": self.volume(), "pieces": float(self.pieces()), "content": content}
+        return super().gauges(flow) | own
+
+    def volume(self) -> float:
+        """Volume (2D: area) of φ < 0 by heights [length^d], not that of the smeared indicator."""
+        measure = length_and_area if self.grid.dim == 2 else area_and_volume
+        return measure(self.grid, self.phi)[1]
 
     def pieces(self) -> int:
         """Number of sets of cells with φ < 0 that are connected through faces, across periodic sides too."""
