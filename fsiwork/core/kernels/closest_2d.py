@@ -17,7 +17,7 @@ SETTLED = 1e-6  # last step [cells]: its square is what remains
 FLAT = 0.25  # least 1 + λκ: nearer to the centre of curvature the step is not Newton's, but still downhill
 
 REACH = 2.0  # of a seed along its parabola [cells]
-SLACK = 0.5  # a seed may be farther than the linear crossing of a grid line by so much [cells]
+NEAR = 1e-9  # by so much a closest point may be farther than the point it replaces [cells]
 
 
 def interpolant(p):
@@ -70,7 +70,7 @@ def project(q, n, order, node, start, w):
     for k in range(ROUNDS):
         if k < FREE:
             i, j = int(np.floor(x)), int(np.floor(y))
-            i, j = min(max(i, half), n[0] - 1 - half), min(max(j, half), n[1] - 1 - half)
+            i, j = min(max(i, half), n[0] - 2 - half), min(max(j, half), n[1] - 2 - half)
         base = (i - half) * n[1] + j - half
         if order == 3:
             f, fx, fy, fxx, fxy, fyy = cubic(q, base, n[1], x - i, y - j, w)
@@ -98,50 +98,43 @@ def project(q, n, order, node, start, w):
 
 
 @serial
-def seeds(q, n, near, order):
+def seeds(q, n, near, start, order):
     """Seeds of the nodes ``near``, shape (nodes, 6): 0, x, y, normal, curvature; a normal of zero where there is none.
 
-    Newton starts at the nearest crossing of a grid line from the node, which also is the seed should it fail.
+    Newton starts at points of grid lines, ``start``: 0, x, y; each is the seed should nothing nearer be found.
     """
     found, w = np.zeros((near.size, 6)), np.empty((6, order + 1))
-    for k in range(near.size):
-        i, j = near[k] // n[1], near[k] % n[1]
-        v = q[near[k]]
-        best, x, y = 2.0, float(i), float(j)
-        for side in range(4):
-            di, dj = (side - 1) * (side < 3) * ((side + 1) % 2), (side - 2) * (side % 2)
-            if 0 <= i + di < n[0] and 0 <= j + dj < n[1]:
-                other = q[(i + di) * n[1] + j + dj]
-                part = v / (v - other)
-                if (other < 0) != (v < 0) and part < best:
-                    best, x, y = part, i + part * di, j + part * dj
-        if v == 0:
-            best, x, y = 0.0, float(i), float(j)
-        found[k, 1], found[k, 2] = x, y
+    for s in range(near.size):
+        i, j = float(near[s] // n[1]), float(near[s] % n[1])
+        x, y = start[s, 1], start[s, 2]
+        most = np.sqrt((x - i) ** 2 + (y - j) ** 2)
+        found[s, 1], found[s, 2] = x, y
         x, y, nx, ny, bend, good = project(q, n, order, (i, j), (x, y), w)
-        if good and (x - i) ** 2 + (y - j) ** 2 <= (best + SLACK) ** 2:
-            found[k, 1:] = x, y, nx, ny, bend
+        if good and np.sqrt((x - i) ** 2 + (y - j) ** 2) <= most + NEAR:
+            found[s, 1:] = x, y, nx, ny, bend
     return found
 
 
 @serial
 def distances(q, n, order, polished, nodes, seed, found, out):
     """Distances of the nodes [cells], at most what stands in ``out``, from the parabola of their seed; at ``polished``
-    cells or less of the seed by Newton's method that starts there."""
+    cells or less by Newton's method that starts there."""
     w = np.empty((6, order + 1))
     for at in nodes:
-        k, i, j = seed[at], float(at // n[1]), float(at % n[1])
-        x, y, nx, ny, bend = found[k, 1], found[k, 2], found[k, 3], found[k, 4], found[k, 5]
+        s, i, j, most = seed[at], float(at // n[1]), float(at % n[1]), abs(out[at])
+        x, y, nx, ny, bend = found[s, 1], found[s, 2], found[s, 3], found[s, 4], found[s, 5]
         rx, ry = i - x, j - y
-        most = np.sqrt(rx * rx + ry * ry)
+        far = np.sqrt(rx * rx + ry * ry)
         if nx != 0 or ny != 0:
             along = (ry * nx - rx * ny) / max(1 + (rx * nx + ry * ny) * bend, FLAT)
             along = min(max(along, -REACH), REACH)
             fall = 0.5 * bend * along * along
-            x, y, good = x - along * ny - fall * nx, y + along * nx - fall * ny, most > polished
-            if not good:
+            x, y, good = x - along * ny - fall * nx, y + along * nx - fall * ny, True
+            circle = np.sqrt((i - x) ** 2 + (j - y) ** 2)
+            if circle < min(polished, most + 0.1):
                 x, y, _, _, _, good = project(q, n, order, (i, j), (x, y), w)
+                circle = np.sqrt((i - x) ** 2 + (j - y) ** 2)
             if good:
-                most = min(most, np.sqrt((i - x) ** 2 + (j - y) ** 2))
-        most = min(most, abs(out[at]))
+                far = min(far, circle)
+        most = min(most, far)
         out[at] = -most if q[at] < 0 else most

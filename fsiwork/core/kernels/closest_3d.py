@@ -17,7 +17,7 @@ FREE = 3  # rounds that may change the cell: the interpolant is only continuous,
 SETTLED = 1e-6  # last step [cells]: its square is what remains
 FLAT = 0.25  # least eigenvalue of 1 + λκ: nearer to a focal point the step is not Newton's, but still downhill
 REACH = 2.0  # of a seed along its paraboloid [cells]
-SLACK = 0.5  # a seed may be farther than the linear crossing of a grid line by so much [cells]
+NEAR = 1e-9  # by so much a closest point may be farther than the point it replaces [cells]
 
 
 def interpolant(p):
@@ -111,9 +111,9 @@ def project(q, n, order, node, y, w, d):
     u, form = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for turn in range(ROUNDS):
         if turn < FREE:
-            i = min(max(int(np.floor(y[0])), half), n[0] - 1 - half)
-            j = min(max(int(np.floor(y[1])), half), n[1] - 1 - half)
-            k = min(max(int(np.floor(y[2])), half), n[2] - 1 - half)
+            i = min(max(int(np.floor(y[0])), half), n[0] - 2 - half)
+            j = min(max(int(np.floor(y[1])), half), n[1] - 2 - half)
+            k = min(max(int(np.floor(y[2])), half), n[2] - 2 - half)
         base = (i - half) * sx + (j - half) * sy + k - half
         if order == 3:
             cubic(q, base, sx, sy, (y[0] - i, y[1] - j, y[2] - k), w, d)
@@ -161,49 +161,8 @@ def moved(y, u, e, f, step, cut):
 
 
 @point
-def beside(at, n, side):
-    """Flat index of the neighbour of a node on one of the six sides, -1 outside."""
-    stride = n[1] * n[2] if side < 2 else n[2] if side < 4 else 1
-    length = n[0] if side < 2 else n[1] if side < 4 else n[2]
-    place = at // stride % length + 2 * (side % 2) - 1
-    return at + (2 * (side % 2) - 1) * stride if 0 <= place < length else -1
-
-
-@point
 def position(at, n):
     return float(at // (n[1] * n[2])), float(at // n[2] % n[1]), float(at % n[2])
-
-
-@serial
-def seeds(q, n, near, order):
-    """Seeds of the nodes ``near``, shape (nodes, 9): point, normal, second form; a normal of zero where there is none.
-
-    Newton starts at the nearest crossing of a grid line from the node, which also is the seed should it fail.
-    """
-    found, w, d = np.zeros((near.size, 9)), np.empty((3, 3, order + 1)), np.empty(10)
-    for k in range(near.size):
-        at = near[k]
-        node = x = position(at, n)
-        best = 0.0 if q[at] == 0 else 2.0
-        for side in range(6):
-            to = beside(at, n, side)
-            if to >= 0 and (q[to] < 0) != (q[at] < 0):
-                part = q[at] / (q[at] - q[to])
-                if part < best:
-                    other, best = position(to, n), part
-                    x = between(node, other, part)
-        found[k, 0], found[k, 1], found[k, 2] = x
-        y, u, form, good = project(q, n, order, node, x, w, d)
-        if good and away(node, y) <= best + SLACK:
-            found[k, 0], found[k, 1], found[k, 2] = y
-            found[k, 3], found[k, 4], found[k, 5] = u
-            found[k, 6], found[k, 7], found[k, 8] = form
-    return found
-
-
-@point
-def between(a, b, part):
-    return a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1]), a[2] + part * (b[2] - a[2])
 
 
 @point
@@ -213,27 +172,45 @@ def away(a, b):
 
 
 @serial
+def seeds(q, n, near, start, order):
+    """Seeds of the nodes ``near``, shape (nodes, 9): point, normal, second form; a normal of zero where there is none.
+
+    Newton starts at points of grid lines, ``start``; each is the seed should nothing nearer be found.
+    """
+    found, w, d = np.zeros((near.size, 9)), np.empty((3, 3, order + 1)), np.empty(10)
+    for s in range(near.size):
+        node, y = position(near[s], n), (start[s, 0], start[s, 1], start[s, 2])
+        most = away(node, y)
+        found[s, 0], found[s, 1], found[s, 2] = y
+        y, u, form, good = project(q, n, order, node, y, w, d)
+        if good and away(node, y) <= most + NEAR:
+            found[s, 0], found[s, 1], found[s, 2] = y
+            found[s, 3], found[s, 4], found[s, 5] = u
+            found[s, 6], found[s, 7], found[s, 8] = form
+    return found
+
+
+@serial
 def distances(q, n, order, polished, nodes, seed, found, out):
     """Distances of the nodes [cells], at most what stands in ``out``, from the paraboloid of their seed; at
-    ``polished`` cells or less of the seed by Newton's method that starts there."""
+    ``polished`` cells or less by Newton's method that starts there."""
     w, d = np.empty((3, 3, order + 1)), np.empty(10)
     for at in nodes:
-        node, k = position(at, n), seed[at]
-        y = found[k, 0], found[k, 1], found[k, 2]
-        u, form = (found[k, 3], found[k, 4], found[k, 5]), (found[k, 6], found[k, 7], found[k, 8])
-        most = away(node, y)
+        node, s, most = position(at, n), seed[at], abs(out[at])
+        y = found[s, 0], found[s, 1], found[s, 2]
+        u, form = (found[s, 3], found[s, 4], found[s, 5]), (found[s, 6], found[s, 7], found[s, 8])
+        far = away(node, y)
         if u != (0.0, 0.0, 0.0):
             e, f = frame(u)
             r = node[0] - y[0], node[1] - y[1], node[2] - y[2]
             b, c = solve(dot(r, u), form, dot(r, e), dot(r, f))
             cut = REACH / max(np.sqrt(b * b + c * c), REACH)
-            b, c = cut * b, cut * c
+            b, c, good = cut * b, cut * c, True
             fall = -0.5 * (form[0] * b * b + 2 * form[1] * b * c + form[2] * c * c)
             y = moved(y, u, e, f, (fall, b, c), 1.0)
-            good = most > polished
-            if not good:
+            if away(node, y) < min(polished, most + 0.1):
                 y, u, form, good = project(q, n, order, node, y, w, d)
             if good:
-                most = min(most, away(node, y))
-        most = min(most, abs(out[at]))
+                far = min(far, away(node, y))
+        most = min(most, far)
         out[at] = -most if q[at] < 0 else most

@@ -55,6 +55,60 @@ def scan(q, n, out, far):
 
 
 @point
+def root(p, count, linear):
+    """The root in [0, 1] of the polynomial Σ p_m s^m, whose signs differ there: Newton, kept inside."""
+    a, b, s = 0.0, 1.0, linear
+    below = p[0] < 0
+    for _ in range(60):
+        value = slope = 0.0
+        for m in range(count - 1, -1, -1):
+            slope = slope * s + value
+            value = value * s + p[m]
+        if (value < 0) == below:
+            a = s
+        else:
+            b = s
+        new = s - value / slope if slope != 0 else a
+        if not a < new < b:
+            new = 0.5 * (a + b)
+        if abs(new - s) < 1e-14:
+            break
+        s = new
+    return s
+
+
+@serial
+def crossings(q, n, near, c):
+    """Nearest point, shape (nodes, 3), where a grid line from a node meets the interface; the node itself with q = 0.
+
+    ``c``: coefficient m on the polynomial of node k of the line, which is k - (size/2 - 1) nodes ahead.
+    """
+    out, p, size = np.empty((near.size, 3)), np.empty(len(c)), len(c)
+    for s in range(near.size):
+        at, best = near[s], 2.0
+        place = at // (n[1] * n[2]), at // n[2] % n[1], at % n[2]
+        out[s, 0], out[s, 1], out[s, 2] = place
+        for side in range(6):
+            axis, way = side // 2, 2 * (side % 2) - 1
+            ahead = place[axis] + way
+            stride = way * (n[1] * n[2] if axis == 0 else n[2] if axis == 1 else 1)
+            if q[at] == 0 or not 0 <= ahead < n[axis] or (q[at + stride] < 0) == (q[at] < 0):
+                continue
+            linear = q[at] / (q[at] - q[at + stride])
+            p[:] = 0.0
+            for k in range(size):
+                there = min(max(place[axis] + way * (k - size // 2 + 1), 0), n[axis] - 1)
+                for m in range(size):
+                    p[m] += c[k, m] * q[at + (there - place[axis]) * way * stride]
+            part = root(p, size, linear)
+            if part < best:
+                best = part
+                out[s, 0], out[s, 1], out[s, 2] = place
+                out[s, axis] += way * part
+    return out
+
+
+@point
 def along(seed, at, count, step, p, i, j, k):
     """Each of ``count`` nodes from ``at`` = (i, j, k) on takes the seed of the one before it if that is nearer."""
     last = seed[at]
@@ -135,7 +189,7 @@ def spread(n, near, points, band):
                 continue
             to = (a * n[1] + b) * n[2] + c
             had, far = seed[to], square(points, own, a, b, c)
-            if had == own or far > band * band + 1:
+            if had == own or far > (band + 0.7) ** 2:
                 continue
             if had < 0:
                 nodes[count] = to
