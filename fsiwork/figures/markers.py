@@ -34,7 +34,7 @@ def _line(figure: Figure, ax, one: xr.Dataset) -> None:
     for k, time in enumerate(TIMES[:-1]):
         x, y = lines[k]
         ax.plot(x, y, color="0.25", linewidth=0.9, alpha=0.35 + 0.15 * k)
-        tip = int(np.argmax(y if k == 0 else x))
+        tip = int(np.argmax(y if k == 0 else 2 * x + y))
         ax.annotate(f"t = {time:g}", (x[tip], y[tip]), (2, 3), textcoords="offset points", fontsize=7)
     x, y = lines[-1]
     points = lines[-1].T
