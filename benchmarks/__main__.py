@@ -12,7 +12,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 prepare(threads=1)
 
-from benchmarks import freefem, poisson, rows, stepping, workflow  # noqa: E402  after the threads are set
+from benchmarks import freefem, poisson, redistancing, rows, stepping, workflow  # noqa: E402  after the threads are set
 
 
 def suite(results: Path) -> dict:
@@ -29,6 +29,9 @@ def suite(results: Path) -> dict:
         "python_share": stepping.python_share,
         "allocation": stepping.allocation,
         "workflow_parse": workflow.parse,
+        "fmm_full": redistancing.full,
+        "fmm_band": redistancing.narrow,
+        "fmm_3d": redistancing.space,
         "freefem": lambda: freefem.compare(results),
         "cold_start": workflow.cold_start,
     }
