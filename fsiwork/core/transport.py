@@ -1,14 +1,22 @@
 """Transport of centre fields by a velocity on the faces: ∂t q + u·∇q = 0 (1.2)."""
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
 from fsiwork.core.grid import Grid
+from fsiwork.core.kernels import annex, foot
+from fsiwork.core.kernels import pieces as some
 from fsiwork.core.kernels import transport as kernels
+from fsiwork.core.pieces import Pieces
 
-Scheme = Literal["weno5", "weno-z", "upwind5", "upwind1"]
+Scheme = Literal[
+    "weno5", "weno-z", "upwind5", "upwind1", "centred", "eno2", "eno3",
+    "lax-wendroff", "beam-warming", "fromm", "semi-lagrangian",
+]  # fmt: skip
+ALL_AXES = ("weno5", "weno-z", "upwind5", "upwind1")  # in one pass
+SPLIT = ("lax-wendroff", "beam-warming", "fromm")  # the whole step, one axis after the other
 
 # Shu-Osher form: each stage is q <- a q(t) + b (q - dt u·∇q).
 TABLEAUX = {
@@ -26,6 +34,7 @@ FLOORS = {
 }
 
 COURANT = 0.5  # dt Σ|u_i|/h; SSP-RK3 with WENO5 is stable to 1.43 in 1D
+BACKWARD = 2.0  # the same for semi-Lagrangian transport: feet stay within the ghosts
 MOST_SUBSTEPS = 10_000  # beyond this the velocity has diverged: stop chasing it and let the run show it
 
 
@@ -36,13 +45,21 @@ class Transport:
     ----------
     grid : the grid
     edges : fills ghosts with ``fill_scalar(q, rule)``
-    scheme : ``weno5`` (Jiang and Shu's weights), ``weno-z`` (fifth order at critical points too),
-        ``upwind5`` (their linear limit: for smooth fields such as x - Y) or ``upwind1``
-    tableau : ``ssp-rk3``, ``ssp-rk2`` or ``euler`` (the last sharpens kinks with WENO: for figures only)
+    scheme : ``weno5`` (Jiang and Shu's weights), ``weno-z`` (fifth order at critical points too), ``upwind5`` (their
+        linear limit: for smooth fields such as x - Y), ``upwind1``; the annex's (7.4) ``centred``, ``eno2``, ``eno3``,
+        and its one-step schemes ``lax-wendroff``, ``beam-warming``, ``fromm``: these are one-dimensional by nature and
+        go along one axis after the other and back (Strang), of second order; ``semi-lagrangian``: q at the foot of the
+        characteristic, a tensor cubic and two Runge-Kutta stages back, of third order when dt ~ Δx, with long steps
+    tableau : ``ssp-rk3``, ``ssp-rk2`` or ``euler`` (the last sharpens kinks with WENO: for figures only);
+        the one-step schemes and the semi-Lagrangian one have a step of their own
     centring : order of the velocity at the centres. 4, (-1, 9, 9, -1)/16, keeps the volume of an oscillating
         drop 3 to 8 times better from 128 cells on; 2 is the adjoint of how a membrane's force goes to the faces, and
         with 4 a membrane makes energy
     dtype : of the fields; float32 is safe at any magnitude of the field because the weights are relative
+    band : half-width [cells] of the band around q = 0 that is carried, see `core.pieces`; None: everywhere. Beyond it
+        q becomes flat: for a φ that is kept near a distance, not for a map or a membrane's stretch
+    from_interface : take u at x - q∇q/|∇q|², the nearest point of the interface: with |∇q| = 1 that is
+        ∂t q + u(x - q∇q)·∇q = 0 of 1.5.1, which keeps a distance a distance; so is any other constant |∇q| kept
 
     Attributes
     ----------
@@ -50,7 +67,8 @@ class Transport:
 
     Raises
     ------
-    ValueError : unknown scheme or tableau
+    ValueError : unknown scheme or tableau; a band too narrow; ``from_interface`` with fourth-order centring or with a
+        scheme other than the Runge-Kutta ones
     """
 
     def __init__(
@@ -61,39 +79,69 @@ class Transport:
         tableau: str = "ssp-rk3",
         dtype=np.float64,
         centring: Literal[2, 4] = 2,
+        *,
+        band: float | None = None,
+        from_interface: bool = False,
     ):
-        name = scheme.replace("-", "_")
-        if scheme not in ("weno5", "weno-z", "upwind5", "upwind1"):
-            raise ValueError(f"transport scheme must be weno5, weno-z, upwind5 or upwind1, got {scheme!r}")
-        if tableau not in TABLEAUX:
-            raise ValueError(f"tableau must be one of {', '.join(TABLEAUX)}, got {tableau!r}")
-        self.grid, self.edges, self.stages = grid, edges, TABLEAUX[tableau]
-        self.dtype, self.centring = np.dtype(dtype), centring
+        self._check(scheme, tableau, centring, from_interface)
+        self.grid, self.edges, self.scheme, self.stages = grid, edges, scheme, TABLEAUX[tableau]
+        self.dtype, self.centring = np.dtype(dtype), 2 if scheme == "semi-lagrangian" else centring
         self.weighted = scheme.startswith("weno")
         self.floor = FLOORS.get((scheme, self.dtype.type), 1.0)
-        self._stage, self._steepest, self._fastest = (
-            getattr(kernels, f"{verb}_{grid.dim}d") for verb in (name, "steepest", "fastest")
-        )
         self.substeps = 0
-        self._strides = np.array(grid.strides[:-1])
-        self._k = np.empty(5, self.dtype)
-        self._top = np.empty(grid.rows()[0].size, self.dtype)
-        self._copies = [grid.field(self.dtype) for _ in self.stages[:2]]
-        self._u: list[np.ndarray] = []
+        self._pieces = None if band is None else Pieces(grid, band)
+        self._ahead = [grid.field(self.dtype) for _ in grid.axes] if from_interface else []
+        self._joined = np.array([from_interface and edges.periodic(a) for a in grid.axes])
+        self._plan()
 
     def advance(self, fields: Sequence[np.ndarray], u: Sequence[np.ndarray], dt: float, rule: str = "linear") -> None:
         """Carry every field over ``dt`` in place; ghosts are filled on entry of each stage and at the end.
 
         ``fields`` are flat fields at centres of the dtype given; ``u`` the components on their low faces
         [length/time], ghosts filled, constant in time; ``rule`` is handed to ``edges.fill_scalar``. Takes
-        as many equal substeps as keep dt Σ|u_i|/h at or below `COURANT`.
+        as many equal substeps as keep dt Σ|u_i|/Δx at or below `COURANT`, or `BACKWARD`.
         """
         u = self._centred(u)
-        dt = dt / self._count(u, dt)
+        rows = self.grid.rows()
+        if not self._pieces:
+            self._count(u, dt, rows)
         for q in fields:
-            self._weights(q, rule)
-            for _ in range(self.substeps):
-                self._substep(q, u, dt, rule)
+            self.edges.fill_scalar(q, rule)
+            if self._pieces:
+                rows = self._near(q)
+                self._count(u, dt, rows)
+            else:
+                self._weights(self._slope(q))
+            for turn in range(self.substeps):
+                if self._pieces and turn:
+                    rows = self._near(q)
+                now = self._step(q, u, dt / self.substeps, rule, rows)
+                some.copy(q, now, *rows)
+                self.edges.fill_scalar(q, rule)
+
+    @staticmethod
+    def _check(scheme, tableau, centring, from_interface):
+        if scheme not in get_args(Scheme):
+            raise ValueError(f"transport scheme must be one of {', '.join(get_args(Scheme))}, got {scheme!r}")
+        if tableau not in TABLEAUX:
+            raise ValueError(f"tableau must be one of {', '.join(TABLEAUX)}, got {tableau!r}")
+        if from_interface and (scheme in (*SPLIT, "semi-lagrangian") or centring == 4):
+            raise ValueError("from_interface needs a Runge-Kutta scheme and centring 2")
+
+    def _plan(self):
+        grid, name = self.grid, self.scheme.replace("-", "_")
+        if self.scheme == "semi-lagrangian":
+            self._kernel = getattr(foot, f"{name}_{grid.dim}d")
+        elif self.scheme in ALL_AXES:
+            self._kernel = getattr(kernels, f"{name}_{grid.dim}d")
+        else:
+            self._kernel = getattr(annex, name)
+        self._steepest, self._fastest = (getattr(kernels, f"{verb}_{grid.dim}d") for verb in ("steepest", "fastest"))
+        self._strides, self._every, self._box = (np.array(x) for x in (grid.strides[:-1], grid.strides, grid.n))
+        self._k = np.empty(5, self.dtype)
+        self._top = np.empty(grid.rows()[0].size * (1 if self._pieces is None else grid.n[-1]), self.dtype)
+        self._copies = [grid.field(self.dtype) for _ in range(2)]
+        self._u: list[np.ndarray] = []
 
     def _centred(self, u: Sequence[np.ndarray]) -> Sequence[np.ndarray]:
         """Face values of the fields' dtype whose plain average is the velocity at the centres."""
@@ -108,35 +156,75 @@ class Transport:
                 kernels.sharpen(copy, c, *self.grid.rows(0, 1), s)
         return self._u
 
-    def _count(self, u, dt: float) -> int:
-        self._fastest(self._top, *u, *self.grid.rows(), self._strides)
-        courant = abs(dt) * float(self._top.max()) / self.grid.h
+    def _count(self, u, dt: float, rows) -> None:
+        self._fastest(self._top, *u, *rows, self._strides)
+        courant = abs(dt) * float(self._top[: rows[0].size].max(initial=0.0)) / self.grid.h
+        limit = BACKWARD if self.scheme == "semi-lagrangian" else COURANT
         # A hair's breadth above: a step chosen as exactly the limit must not fall over it by rounding.
-        needed = np.ceil(courant / COURANT * (1 - 1e-12)) if np.isfinite(courant) else 1
+        needed = np.ceil(courant / limit * (1 - 1e-12)) if np.isfinite(courant) else 1
         self.substeps = int(min(max(needed, 1), MOST_SUBSTEPS))
-        return self.substeps
 
-    def _weights(self, q: np.ndarray, rule: str) -> None:
-        """Scale and floor of the smoothness indicators: their ratio is `floor` times the largest squared difference."""
-        self.edges.fill_scalar(q, rule)
-        self._k[3:] = 1.0
+    def _slope(self, q: np.ndarray) -> float:
+        """Largest difference of neighbours, for the schemes that ask."""
         if not self.weighted:
-            return
+            return 0.0
         self._steepest(self._top, q, *self.grid.rows(), self._strides)
+        return float(self._top.max())
+
+    def _weights(self, slope: float) -> None:
+        """Scale and floor of the smoothness indicators: their ratio is `floor` times the largest squared difference."""
         # The kernel has 12 S. Both by the root of the floor: powers of S then stay in the middle of the range.
         floor = np.sqrt(12 * self.floor)
-        scale = float(self._top.max()) ** 2 * floor
-        if np.finfo(self.dtype).tiny < scale < np.inf:
-            self._k[3:] = 1 / scale, floor
+        scale = slope**2 * floor
+        usable = self.weighted and np.finfo(self.dtype).tiny < scale < np.inf
+        self._k[3:] = (1 / scale, floor) if usable else 1.0
 
-    def _substep(self, q: np.ndarray, u, dt: float, rule: str) -> None:
-        now, (start, n) = q, self.grid.rows()
+    def _near(self, q: np.ndarray) -> tuple[np.ndarray, int]:
+        """Starts and length of the pieces of the band of ``q``; the copies get what stencils read beside them."""
+        self._pieces.find(q)
+        self._weights(self._pieces.steepest)
+        for copy in self._copies:
+            some.copy(copy, q, self._pieces.around, self._pieces.n)
+        return self._pieces.start, self._pieces.n
+
+    def _step(self, q: np.ndarray, u, dt: float, rule: str, rows) -> np.ndarray:
+        """One substep into a copy, which is returned; ``q`` stays."""
+        if self.scheme == "semi-lagrangian":
+            self._kernel(self._copies[0], q, *u, *rows, self._every, self._box, dt / self.grid.h)
+            return self._copies[0]
+        now = q
+        if self.scheme in SPLIT:
+            halves = [(a, 0.5) for a in self.grid.axes[:-1]]
+            for sweep, (a, part) in enumerate((*halves, (self.grid.dim - 1, 1.0), *reversed(halves))):
+                if sweep:
+                    self.edges.fill_scalar(now, rule)
+                out = self._copies[sweep % 2]
+                self._kernel(out, now, u[a], *rows, self.grid.strides[a], part * dt / (2 * self.grid.h))
+                now = out
+            return now
         for stage, (a, b) in enumerate(self.stages):
             if stage:
                 self.edges.fill_scalar(now, rule)
             self._k[:3] = a, b, b * dt / (2 * self.grid.h)
             out = self._copies[stage % 2]
-            self._stage(out, q, now, *u, start, n, self._strides, self._k)
+            self._stage(out, q, now, self._ahead_of(u, now, *rows), *rows)
             now = out
-        np.copyto(self.grid.inside(q), self.grid.inside(now))
-        self.edges.fill_scalar(q, rule)
+        return now
+
+    def _stage(self, out, base, q, u, start, n) -> None:
+        if self.scheme in ALL_AXES:
+            self._kernel(out, base, q, *u, start, n, self._strides, self._k)
+            return
+        for a, s in enumerate(self.grid.strides):
+            self._kernel(out, base, q, u[a], start, n, s, self._k, a == 0)
+
+    def _ahead_of(self, u, q, start, n):
+        """The velocity at the interface, on the faces that a stage reads; or ``u`` as it is."""
+        if not self._ahead:
+            return u
+        kernel = getattr(foot, f"at_interface_{self.grid.dim}d")
+        for a, (out, c) in enumerate(zip(self._ahead, u, strict=True)):
+            faces = np.union1d(start, start + self.grid.strides[a])
+            last = a == self.grid.dim - 1
+            kernel(out, c, q, start if last else faces, n + last, self._every, a, self._box, self._joined)
+        return self._ahead
