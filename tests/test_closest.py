@@ -3,6 +3,9 @@
 import numpy as np
 import pytest
 
+from benchmarks import redistancing
+from fsiwork.core.closest import WEIGHTS
+from fsiwork.core.curvature import of_ellipsoid
 from fsiwork.core.grid import GHOSTS, Grid
 from fsiwork.core.kernels import closest_2d, closest_3d, rasters
 from fsiwork.core.redistance import METHODS, redistance
@@ -269,3 +272,38 @@ def test_rasters_and_rings_find_nearest_points(n):
     assert (all_distances[reached, ring[reached]] - least[reached]).max() < 0.4
     assert set(np.flatnonzero(least < 4.0)) <= set(reached)
     assert (np.delete(ring, reached) == -1).all()
+
+
+def test_seeds_carry_the_curvatures():
+    """Sum and product of the principal ones are H and G of an ellipsoid (7.1); 1/R of a circle."""
+    grid = Grid((24, 24), 1.0, (-12.2, -11.9))
+    phi = grid.sample(lambda x, y: x**2 + y**2 - 64.0)
+    near, _ = rasters.scan(phi, (1, *grid.shape), np.empty_like(phi), 6.0)
+    start = rasters.crossings(phi, (1, *grid.shape), near, WEIGHTS[3])
+    assert closest_2d.seeds(phi, grid.shape, near, start, 3)[:, 5] == pytest.approx(1 / 8)
+    axes = (9.0, 6.0, 7.0)
+    grid = Grid((24,) * 3, 1.0, (-12.2, -11.9, -12.05))
+    phi = grid.sample(lambda *x: sum((c / a) ** 2 for c, a in zip(x, axes, strict=True)) - 1)
+    near, _ = rasters.scan(phi, grid.shape, np.empty_like(phi), 6.0)
+    start = rasters.crossings(phi, grid.shape, near, WEIGHTS[5])
+    found = closest_3d.seeds(phi, grid.shape, near, start, 5)
+    points = (found[:, :3] + np.array(grid.origin) + 0.5 - GHOSTS).T
+    assert sum((c / a) ** 2 for c, a in zip(points, axes, strict=True)) == pytest.approx(1, abs=1e-12)
+    mean, gauss = of_ellipsoid(axes, *points)
+    assert found[:, 6] + found[:, 8] == pytest.approx(mean)
+    assert found[:, 6] * found[:, 8] - found[:, 7] ** 2 == pytest.approx(gauss)
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_benchmarks_beside_scikit_fmm(monkeypatch, there):
+    """Without the peer nothing is decided, and the row says why."""
+    if not there:
+        monkeypatch.setattr(redistancing, "peer", lambda: None)
+    elif redistancing.peer() is None:
+        pytest.skip("scikit-fmm is not installed")
+    for names, cells in ((("fmm_band", "fmm_band_quintic"), 48), (("fmm_3d",), 16)):
+        for name, row in zip(names, redistancing.compare(names, cells, 0.0, 1), strict=True):
+            assert row["benchmark"] == name
+            assert row["measured"] > 0
+            assert (row["pass"] is None) == (not there)
+            assert ("not installed" in row["note"]) == (not there)

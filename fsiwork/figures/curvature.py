@@ -11,6 +11,7 @@ from fsiwork.figures import style
 SURFACES = {
     "torus": ("torus, distance", style.OKABE_ITO[0], "o"),
     "ellipsoid-distance": ("ellipsoid, distance", style.OKABE_ITO[1], "s"),
+    "ellipsoid-redistanced": ("ellipsoid, redistanced (quintic)", style.OKABE_ITO[3], "x"),
     "ellipsoid-quadratic": ("ellipsoid, quadratic φ", style.OKABE_ITO[2], "^"),
 }
 
@@ -35,6 +36,6 @@ def curvature_7_1(datasets: Mapping[str, xr.Dataset], measured: Mapping[str, flo
         ax.set_xticks(ticks, [str(int(t)) for t in ticks])
         ax.set_xticks([], minor=True)
     axes[0].set_ylabel("largest error / largest exact value [1]")
-    axes[1].legend(loc="center right", fontsize=7)
+    axes[1].legend(loc="lower right", bbox_to_anchor=(1.0, 0.2), fontsize=7)
     style.note(figure, datasets, "nodes within Δx of the surface; box [−1, 1]³")
     return figure

@@ -12,6 +12,7 @@ import xarray as xr
 
 from fsiwork.core.curvature import curvatures, of_ellipsoid, of_torus, shifted
 from fsiwork.core.grid import Grid
+from fsiwork.core.redistance import redistance
 from fsiwork.core.shapes import Ellipsoid, Torus
 from fsiwork.studies.orders import slope
 
@@ -43,6 +44,19 @@ def _distance(grid: Grid):
     return phi, phi, lambda nodes, x: shifted(*of_ellipsoid(SEMI_AXES, *_foot(x)), phi[nodes])
 
 
+def _redistanced(grid: Grid):
+    """exp of the quadratic φ, less 1, made a distance by closest points on quintics, which would be exact for a
+    polynomial; exact curvatures as those of `_distance`."""
+    phi = redistance(grid, np.expm1(_square(grid) - 1), "closest-quintic")
+    return phi, phi, lambda nodes, x: shifted(*of_ellipsoid(SEMI_AXES, *_foot(x)), _to_foot(x))
+
+
+def _to_foot(x: list[np.ndarray]) -> np.ndarray:
+    """Signed distances of points near the ellipsoid from it [length]."""
+    outside = sum((c / a) ** 2 for c, a in zip(x, SEMI_AXES, strict=True)) > 1
+    return np.where(outside, 1, -1) * np.sqrt(sum((c - f) ** 2 for c, f in zip(x, _foot(x), strict=True)))
+
+
 def _points(grid: Grid, nodes: np.ndarray) -> list[np.ndarray]:
     """Coordinates of flat indices."""
     lines = (np.ravel(line) for line in grid.points())
@@ -58,7 +72,12 @@ def _foot(x: list[np.ndarray]) -> list[np.ndarray]:
     return [c * s / (s + t) for c, s in zip(x, square, strict=True)]
 
 
-SURFACES = {"torus": _torus, "ellipsoid-quadratic": _quadratic, "ellipsoid-distance": _distance}
+SURFACES = {
+    "torus": _torus,
+    "ellipsoid-quadratic": _quadratic,
+    "ellipsoid-distance": _distance,
+    "ellipsoid-redistanced": _redistanced,
+}
 
 
 def surface(_scene, point: dict[str, Any]) -> dict[str, Any]:
@@ -83,7 +102,7 @@ def curvature_7_1(datasets: Mapping[str, xr.Dataset]) -> dict[str, float]:
     out = {}
     for order in (2, 4):
         for name in QUANTITIES:
-            for shape in ("torus", "ellipsoid-distance"):
+            for shape in ("torus", "ellipsoid-distance", "ellipsoid-redistanced"):
                 one = data[name].sel(surface=shape, order=order)
                 label = f"{name}_{order}_{shape.replace('-', '_')}"
                 out[f"{label}_order"] = slope(2 / one["cells"], one)
