@@ -112,8 +112,7 @@ class Bubbles(Membrane):
         if self.film:
             self._break_films()
         if self._volume is not None:
-            surface = self._sum(dirac(self.phi, self.eps))
-            self.phi += (self.volume() - self._volume) / surface if surface else 0.0
+            self._restore_volume()
 
     # --- answers ----------------------------------------------------------------------------------------------
     def gauges(self, flow) -> dict[str, float]:
@@ -146,6 +145,12 @@ class Bubbles(Membrane):
     # --- parts ------------------------------------------------------------------------------------------------
     def _union(self, *x):
         return np.minimum.reduce(np.broadcast_arrays(*(distance(*x) for distance in self.shapes)))
+
+    def _restore_volume(self):
+        """Shift φ by (V - V₀)/∫D_ε(φ), half a cell at most: a Newton step a time step."""
+        surface, h = self._sum(dirac(self.phi, self.eps)), self.grid.h
+        if surface:
+            self.phi += np.clip((self.volume() - self._volume) / surface, -0.5 * h, 0.5 * h)
 
     def _break_films(self):
         """Where two pieces come nearer than ``film``, join them by a ball half as wide again."""
