@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from fsiwork.core.edges import Edges, Side
-from fsiwork.core.grid import Grid
+from fsiwork.core.grid import GHOSTS, Grid
 from fsiwork.core.kernels import relaxation as kernels
 from fsiwork.core.levelset import gradient_norm
 from fsiwork.core.transport import TABLEAUX
@@ -18,23 +18,23 @@ ITERATIONS = 20  # without a band: 10 cells on each side
 SADDLE = 0.1  # smallest slope of a crossed cell in parts of the largest difference of its corners
 
 
-def pde(grid: Grid, phi: np.ndarray, band: float | None, edges: Edges | None = None) -> np.ndarray:
+def pde(grid: Grid, phi: np.ndarray, band: float | None = None) -> np.ndarray:
     """(1.36) with the smoothed sign S = φ₀/√(φ₀² + |∇φ₀|²Δx²): the interface moves a little each time, to first order.
 
     ``band`` [cells]: as many iterations as the distance needs to travel it, values beyond it are cut; None:
-    `ITERATIONS`, nothing is cut. ``edges`` fills the ghosts of each stage; None: linear extrapolation on every side.
+    `ITERATIONS`, nothing is cut. The ghosts of each stage: wrapped where those of φ₀ are, else linear extrapolation.
     """
-    return _redistance(grid, phi, band, edges, _smoothed)
+    return _redistance(grid, phi, band, _smoothed)
 
 
-def subcell(grid: Grid, phi: np.ndarray, band: float | None, edges: Edges | None = None) -> np.ndarray:
+def subcell(grid: Grid, phi: np.ndarray, band: float | None = None) -> np.ndarray:
     """(1.36) with the fix of Russo and Smereka: nodes next to the interface take their distance from φ₀ alone.
 
     There the distance of `beside` is held in every stage (where their relaxation would end), elsewhere S = ±1.
     Arguments as for `pde`. Stable however often it is repeated: gradients at the nodes themselves are not, they
     see the smoothing on the way out and add it to the ripple of the interface.
     """
-    return _redistance(grid, phi, band, edges, _held)
+    return _redistance(grid, phi, band, _held)
 
 
 def renormalised(grid: Grid, phi: np.ndarray) -> np.ndarray:
@@ -44,6 +44,14 @@ def renormalised(grid: Grid, phi: np.ndarray) -> np.ndarray:
     """
     slope = np.maximum(gradient_norm(grid, phi), np.abs(phi) / phi.dtype.type(math.hypot(*grid.length)))
     return np.divide(phi, slope, out=np.zeros_like(phi), where=slope > 0)
+
+
+def wraps(grid: Grid, phi: np.ndarray, a: int) -> bool:
+    """Whether the ghosts in direction a repeat the cells (of one value all over they would say nothing: False)."""
+    q, n = np.moveaxis(grid.padded(phi), a, 0), grid.n[a]
+    ghosts = np.concatenate([q[:GHOSTS], q[n + GHOSTS :]])
+    cells = np.concatenate([q[n : n + GHOSTS], q[GHOSTS : 2 * GHOSTS]])
+    return bool(np.array_equal(ghosts, cells) and (ghosts != ghosts.flat[0]).any())
 
 
 def beside(grid: Grid, phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -62,10 +70,10 @@ def beside(grid: Grid, phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return nodes, np.clip(phi[nodes] * (count[nodes] / total[nodes]), -reach, reach)
 
 
-def _redistance(grid, phi, band, edges, begin):
+def _redistance(grid, phi, band, begin):
     if not np.isfinite(phi).all():
         return np.full_like(phi, np.nan)
-    edges = edges or Edges(grid, ((Side("outflow"),) * 2,) * grid.dim)
+    edges = Edges(grid, tuple((Side("periodic" if wraps(grid, phi, a) else "outflow"),) * 2 for a in grid.axes))
     q = phi.astype(np.float64)
     _, slope = _crossed(grid, q)
     steep = np.median(slope) if slope.size else np.abs(q).max()
