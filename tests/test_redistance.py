@@ -11,6 +11,7 @@ from fsiwork.core.kernels import relaxation as kernels
 from fsiwork.core.redistance import METHODS, redistance
 from fsiwork.core.relaxation import beside, renormalised
 from fsiwork.core.shapes import Ball, Box, Ellipsoid, Union
+from fsiwork.studies import redistancing as study
 
 CLASSICAL = ("pde", "subcell", "fast-marching-1", "fast-marching-2", "fast-sweeping")
 MARCHING = ("fast-marching-1", "fast-marching-2", "fast-sweeping")
@@ -286,3 +287,20 @@ def test_one_stage_against_exact_slopes(dim, sign):
         errors.append(np.abs(grid.inside(out) - grid.inside(wanted)).max() / grid.h)
     assert errors[1] < 1e-6
     assert math.log2(errors[0] / errors[1]) > 4.5
+
+
+def test_the_study_reads_polynomials_of_fifth_order_exactly():
+    grid = square(16)
+    phi = grid.sample(lambda x, y: x**5 - 3 * x**2 * y**5 + y - 0.3)
+    x, y = np.random.default_rng(5).uniform(-0.45, 0.45, (2, 50))
+    found = study._interpolated(grid, phi, [x, y])
+    assert found == pytest.approx(x**5 - 3 * x**2 * y**5 + y - 0.3, abs=1e-13)
+
+
+def test_the_study_measures_errors_and_drift():
+    found = study.errors(None, {"method": "fast-marching-2", "cells": 64})
+    assert 1e-5 < found["near"] <= found["outside"] <= found["box"] < 5e-3
+    assert found["ms"] > 0
+    assert np.isnan(study.errors(None, {"method": "closest-cubic", "cells": 32})["box"])
+    moved = [study.drift(None, {"method": "pde", "cells": 64, "repeats": k})["moved"] for k in (0, 1)]
+    assert moved[0] < 1e-5 < 1e-3 < moved[1] < 0.2
