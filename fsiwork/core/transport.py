@@ -214,9 +214,8 @@ class Transport:
     def _stage(self, out, base, q, u, start, n) -> None:
         if self.scheme in ALL_AXES:
             self._kernel(out, base, q, *u, start, n, self._strides, self._k)
-            return
-        for a, s in enumerate(self.grid.strides):
-            self._kernel(out, base, q, u[a], start, n, s, self._k, a == 0)
+        else:
+            self._kernel(out, base, q, tuple(u), start, n, self._every, self._k)
 
     def _ahead_of(self, u, q, start, n):
         """The velocity at the interface, on the faces that a stage reads; or ``u`` as it is."""

@@ -1,9 +1,9 @@
-"""The annex's simpler schemes for ∂t q + u·∇q = 0 at cell centres (7.4), one axis a call, in 2D and 3D.
+"""The annex's simpler schemes for ∂t q + u·∇q = 0 at cell centres (7.4), in 2D and 3D.
 
-The kernels of a Runge-Kutta stage add the axis to ``out``: a base + b q - c (u_low + u_high) h ∂q with
-``k = (a, b, b dt/2h, …)``; only the ``first`` call of a stage sets a base + b q. The one-step kernels make the whole
-step along their axis. The velocity ``u`` is on the low faces of the axis, ``s`` is the axis's stride; ``q`` needs three
-ghosts and ``out`` must share no memory with it.
+The kernels of a Runge-Kutta stage write ``out = a base + b (q - dt u·∇q)`` with ``k = (a, b, b dt/2h, …)``; ``u`` is
+the tuple of the velocity's components on their low faces, ``s`` the strides of all axes. The one-step kernels make the
+whole step along one axis of stride ``s``, with its component ``u``. ``q`` needs three ghosts and ``out`` must share no
+memory with it. Rows may overlap: every one is finished before it is written.
 """
 
 import numpy as np
@@ -61,14 +61,20 @@ def mirrored(scheme, w, m3, m2, m1, o, p1, p2, p3, c):
 
 
 @inline
-def stage(scheme, out, base, q, u, I, n, s, k, first):
-    a, b, c = k[0], k[1], k[2]
-    o, z, u0, u1 = out[I : I + n], base[I : I + n], u[I : I + n], u[I + s : I + s + n]
-    m3, m2, m1, p0 = q[I - 3 * s : I - 3 * s + n], q[I - 2 * s : I - 2 * s + n], q[I - s : I - s + n], q[I : I + n]
-    p1, p2, p3 = q[I + s : I + s + n], q[I + 2 * s : I + 2 * s + n], q[I + 3 * s : I + 3 * s + n]
+def stage(scheme, out, base, q, u, I, n, strides, k):
+    g = np.zeros(n, q.dtype)
+    for axis in range(len(u)):
+        s = strides[axis]
+        u0, u1 = u[axis][I : I + n], u[axis][I + s : I + s + n]
+        m3, m2, m1 = q[I - 3 * s : I - 3 * s + n], q[I - 2 * s : I - 2 * s + n], q[I - s : I - s + n]
+        p1, p2, p3 = q[I + s : I + s + n], q[I + 2 * s : I + 2 * s + n], q[I + 3 * s : I + 3 * s + n]
+        p0 = q[I : I + n]
+        for i in range(n):
+            w = u0[i] + u1[i]
+            g[i] += mirrored(scheme, w, m3[i], m2[i], m1[i], p0[i], p1[i], p2[i], p3[i], w)
+    o, z, p0 = out[I : I + n], base[I : I + n], q[I : I + n]
     for i in range(n):
-        g = c * mirrored(scheme, u0[i] + u1[i], m3[i], m2[i], m1[i], p0[i], p1[i], p2[i], p3[i], c)
-        o[i] = a * z[i] + b * p0[i] - g if first else o[i] - g
+        o[i] = k[0] * z[i] + k[1] * p0[i] - k[2] * g[i]
 
 
 @inline
@@ -85,21 +91,21 @@ def whole(scheme, out, q, u, I, n, s, ratio):
 
 
 @loop
-def centred(out, base, q, u, start, n, s, k, first):
+def centred(out, base, q, u, start, n, s, k):
     for r in prange(start.size):
-        stage(CENTRED, out, base, q, u, start[r], n, s, k, first)
+        stage(CENTRED, out, base, q, u, start[r], n, s, k)
 
 
 @loop
-def eno2(out, base, q, u, start, n, s, k, first):
+def eno2(out, base, q, u, start, n, s, k):
     for r in prange(start.size):
-        stage(ENO2, out, base, q, u, start[r], n, s, k, first)
+        stage(ENO2, out, base, q, u, start[r], n, s, k)
 
 
 @loop
-def eno3(out, base, q, u, start, n, s, k, first):
+def eno3(out, base, q, u, start, n, s, k):
     for r in prange(start.size):
-        stage(ENO3, out, base, q, u, start[r], n, s, k, first)
+        stage(ENO3, out, base, q, u, start[r], n, s, k)
 
 
 @loop
