@@ -90,4 +90,4 @@ def _order(ax, ends: tuple[float, float], start: float, order: float) -> None:
     """A reference of an order from its low end."""
     x = np.array(ends, float)
     ax.plot(x, start * (x / x[0]) ** order, **style.REFERENCE)
-    ax.text(x[0], start, f"order {order:g} ", fontsize=7.5, color="0.35", va="bottom")
+    ax.text(x[0], 0.9 * start, f"  order {order:g}", fontsize=7.5, color="0.35", va="top")

@@ -20,6 +20,7 @@ from fsiwork.core.kernels.quintic import (
     bounds,
     bracketed,
     horner,
+    ordered,
     roots,
 )
 
@@ -123,7 +124,7 @@ def line(c, faces, z, weight, plane, lines, total):
             plane[0, k, l], plane[1, k, l] = horner(c[k, l], z)
     count = roots(low, ends, work)
     count += roots(high, ends[count:], work)
-    ends[:count].sort()
+    ordered(ends, count)
     ends[count] = 0.5
     start = -0.5
     for piece in range(count + 1):
@@ -146,7 +147,7 @@ def graph(c, faces, plane, lines, total):
         for m in range(N):
             side[m] = horner(faces[k // 2, :, m], 0.5 - k % 2)[0]
         count += roots(side, ends[count:], work)
-    ends[:count].sort()
+    ordered(ends, count)
     ends[count] = 0.5
     start = -0.5
     for piece in range(count + 1):

@@ -22,13 +22,14 @@ from fsiwork.core.kernels.quintic import (
     bounds,
     bracketed,
     horner,
+    ordered,
     roots,
 )
 
 serial = njit(error_model="numpy", fastmath=FASTMATH, cache=True)
 
 DEPTH = 5
-GAUSS, WEIGHTS = (0.5 * q for q in np.polynomial.legendre.leggauss(5))
+GAUSS, WEIGHTS = (0.5 * q for q in np.polynomial.legendre.leggauss(4))
 
 
 @point
@@ -70,7 +71,7 @@ def graph(c, work, found, total):
     side(c, 0.5, high)
     count = roots(low, found, work)
     count += roots(high, found[count:], work)
-    found[:count].sort()
+    ordered(found, count)
     found[count] = 0.5
     start = -0.5
     for piece in range(count + 1):

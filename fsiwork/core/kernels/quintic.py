@@ -37,7 +37,19 @@ def horner(p, x):
 
 @point
 def bracketed(p, a, b, below):
-    """The root of p in [a, b], over whose ends it changes its sign; ``below``: p(a) ≤ 0. Newton, kept inside."""
+    """The root of p in [a, b], over whose ends it changes its sign; ``below``: p(a) ≤ 0.
+
+    Four steps of Newton's method from the chord, without a branch: enough where p is hardly bent. Else kept in a
+    bracket, one by one.
+    """
+    low, high = horner(p, a)[0], horner(p, b)[0]
+    x, step = a + (b - a) * low / (low - high), 0.0
+    for _ in range(4):
+        value, slope = horner(p, x)
+        step = value / slope
+        x = min(max(x - step, a), b)
+    if abs(step) < 1e-13:
+        return x
     x = 0.5 * (a + b)
     for _ in range(60):
         value, slope = horner(p, x)
@@ -105,3 +117,14 @@ def bounds(c):
             across += 2 * l * size
     x, y = abs(c[1, 0]), abs(c[0, 1])
     return spread, 2 * x - along, along, 2 * y - across, across
+
+
+@point
+def ordered(x, count):
+    """Sorts the first few numbers; faster than a general sort of so few."""
+    for k in range(1, count):
+        value, m = x[k], k
+        while m > 0 and x[m - 1] > value:
+            x[m] = x[m - 1]
+            m -= 1
+        x[m] = value
