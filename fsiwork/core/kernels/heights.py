@@ -29,7 +29,7 @@ from fsiwork.core.kernels.quintic import (
 serial = njit(error_model="numpy", fastmath=FASTMATH, cache=True)
 
 DEPTH = 5
-GAUSS, WEIGHTS = (0.5 * q for q in np.polynomial.legendre.leggauss(4))
+GAUSS, WEIGHTS = (0.5 * q for q in np.polynomial.legendre.leggauss(5))
 
 
 @point
