@@ -11,7 +11,7 @@ from fsiwork.dataset import BOOK, CONVENTIONS
 from fsiwork.netcdf import Writer, written
 
 if TYPE_CHECKING:
-    from fsiwork.core.contours import Segmentation
+    from fsiwork.core.segmentation import Segmentation
 
 DEEP = ("1", "I", "I;16", "I;16B", "I;16L", "F")  # modes of Pillow whose values are levels as they are
 
@@ -60,7 +60,7 @@ def to_file(image: str | Path, path: str | Path, smoothing: float = 2.5) -> str:
         raise ValueError(f"{path}: the file of a segmentation ends in .nc and is no folder")
     q = read(image)
     provenance.prepare(running.threads())
-    from fsiwork.core.contours import segment
+    from fsiwork.core.segmentation import segment
 
     try:
         found = segment(q, smoothing)

@@ -5,15 +5,12 @@ outside, c₂ the one inside, and |∇H_ε| = D_ε|∇φ| the measure of the int
 signs and factors of the errata, ∂ₜφ = D_ε {β div n - α [(u₀ - c₁)² - (u₀ - c₂)²]}. Here it is the exact gradient of the
 discrete E, and a step is taken only when E falls by what the gradient promises. Fields are compact, of shape ``n``,
 in the plane and in space alike; nothing flows through the sides.
-
-`segment` does all of it for an image of any units, with lengths in cells.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
 
 from fsiwork.core.grid import GHOSTS, Grid
 from fsiwork.core.poisson import Direct
@@ -23,7 +20,6 @@ PROMISE = 0.1  # part of the decrease to first order that a step must reach (Arm
 FLAT = 1e-3  # |∇H_ε| [1/ε] below which the interface has no direction
 HALVINGS = 30
 SETTLED = 1e-5
-SMALLEST = 8  # cells in a direction
 
 
 @dataclass(frozen=True)
@@ -52,14 +48,14 @@ class Contours:
     ValueError : the image has another shape or is not finite, or a number is not positive.
     """
 
-    def __init__(self, grid: Grid, image: np.ndarray, smoothing: float, eps: float, method: str = "fast-sweeping"):
+    def __init__(self, grid: Grid, image: np.ndarray, smoothing: float, eps: float, method: str = "closest-cubic"):
         if image.shape != grid.n or not np.isfinite(image).all():
             raise ValueError(f"the image must be finite and of shape {grid.n}, got {image.shape}")
         if not (smoothing > 0 and eps > 0):
             raise ValueError(f"smoothing and eps must be positive, got {smoothing} and {eps}")
         self.grid, self.image, self.beta, self.eps = grid, np.asarray(image, float), float(smoothing), float(eps)
         self.method = method
-        self.step_limit = 2 * eps**2 / (np.pi * max(float(self.image.var()), 1e-300))  # the front moves by about ε
+        self.step_limit = 8 * eps**2 / (np.pi * max(float(self.image.var()), 1e-300))  # the front moves by some ε
         self._solver = Direct(grid.n, grid.h, (("neumann", "neumann"),) * grid.dim)
 
     def state(self, phi: np.ndarray) -> State:
@@ -106,11 +102,16 @@ class Contours:
         return self.grid.inside(found).copy()
 
     def _heaviside(self, phi: np.ndarray) -> np.ndarray:
-        r = np.clip(phi / self.eps, -1, 1)
-        return 0.5 * (1 + r + np.sin(np.pi * r) / np.pi)
+        r = phi / self.eps
+        H = (r > 0).astype(float)
+        near = np.abs(r) < 1  # a few cells: sines are dear
+        H[near] = 0.5 * (1 + r[near] + np.sin(np.pi * r[near]) / np.pi)
+        return H
 
     def _dirac(self, phi: np.ndarray) -> np.ndarray:
-        return 0.5 * (1 + np.cos(np.pi * np.clip(phi / self.eps, -1, 1))) / self.eps
+        D, near = np.zeros_like(phi), np.abs(phi) < self.eps
+        D[near] = 0.5 * (1 + np.cos(np.pi * phi[near] / self.eps)) / self.eps
+        return D
 
     def _differences(self, q: np.ndarray) -> list[np.ndarray]:
         return [np.diff(q, axis=a) / self.grid.h for a in self.grid.axes]
@@ -159,82 +160,6 @@ def descend(
         state = contours.state(contours.distance(state.phi))
         watch(count, state, True)
     return state, f"stopped after {count} steps"
-
-
-@dataclass(frozen=True)
-class Segmentation:
-    """Two parts of an image: φ < 0 ``inside``; levels in the image's units; the energy after each step.
-
-    ``energy`` [level² × cells², of the image scaled to 0 and 1] and ``fresh`` (redistanced; E may have risen) have the
-    shape ``(rows,)``; ``ended`` as by `descend`.
-    """
-
-    phi: np.ndarray
-    outside: float
-    inside: float
-    energy: np.ndarray
-    fresh: np.ndarray
-    steps: int
-    ended: str
-
-
-def segment(
-    image: np.ndarray, smoothing: float = 2.5, eps: float = 3.0, steps: int = 4000, watch: Watch | None = None
-) -> Segmentation:
-    """Part an image of two levels, from a contour along its sides inwards.
-
-    Parameters
-    ----------
-    image : shape (x, y[, z]), at least 8 cells in each direction, finite, any units
-    smoothing : radius [cells] below which a disc of full contrast is taken for noise
-    eps : half-width of the contour [cells]
-
-    Raises ValueError, in one line, when nothing can be parted.
-    """
-    q = np.asarray(image, float)
-    if q.ndim not in (2, 3) or min(q.shape) < SMALLEST:
-        raise ValueError(f"at least {SMALLEST} cells in two or three directions, got {' × '.join(map(str, q.shape))}")
-    if not np.isfinite(q).all():
-        raise ValueError(f"{np.count_nonzero(~np.isfinite(q))} values are not finite")
-    low, high = two_levels(gaussian_filter(q, smoothing))
-    contours = Contours(Grid(q.shape, 1.0), (q - low) / (high - low), smoothing, eps)
-    energy, fresh = [], []
-
-    def keep(step: int, state: State, new: bool) -> None:
-        energy.append(state.energy)
-        fresh.append(new)
-        if watch:
-            watch(step, state, new)
-
-    state, ended = descend(contours, surrounding(q.shape, min(2 * eps, min(q.shape) / 4)), steps=steps, watch=keep)
-    levels = (low + (high - low) * c for c in (state.outside, state.inside))
-    count = len(fresh) - sum(fresh)
-    return Segmentation(state.phi, *levels, np.array(energy), np.array(fresh), count, ended)
-
-
-def surrounding(n: tuple[int, ...], margin: float) -> np.ndarray:
-    """Distance [cells] to the box that lies ``margin`` within the sides, negative in it (max norm outside)."""
-    lines = np.meshgrid(*(np.abs(np.arange(k) + 0.5 - k / 2) - k / 2 for k in n), indexing="ij", sparse=True)
-    phi = np.full(n, -np.inf)
-    for line in lines:
-        phi = np.maximum(phi, line + margin)
-    return phi
-
-
-def two_levels(q: np.ndarray) -> tuple[float, float]:
-    """Mean levels below and above the threshold that parts the histogram best (Otsu 1979).
-
-    Raises ValueError when all values are one.
-    """
-    first, last = float(q.min()), float(q.max())
-    if not (last - first > 1e-9 * max(abs(first), abs(last)) and np.isfinite(last - first)):
-        raise ValueError(f"all values are {first:.6g}: there is nothing to part")
-    count, edges = np.histogram(q, 256)
-    below = np.cumsum(count)[:-1]
-    mean = np.cumsum(count * 0.5 * (edges[1:] + edges[:-1] - 2 * first))
-    between = (mean[-1] * below / q.size - mean[:-1]) ** 2 / (below * (q.size - below))
-    high = q >= edges[1 + int(np.argmax(between))]
-    return float(q[~high].mean()), float(q[high].mean())
 
 
 def _mean(q: np.ndarray, weight: np.ndarray) -> float:

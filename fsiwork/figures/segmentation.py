@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from fsiwork.figures import style
 
-NAMES = {"discs": "three discs and a bar", "others": "shapes that no parameter was chosen on"}
+NAMES = {"discs": "three discs and a bar", "others": "other shapes, levels and noise"}
 
 
 def fig_1_3(datasets: Mapping[str, xr.Dataset], measured: Mapping[str, float]) -> Figure:
@@ -19,7 +19,7 @@ def fig_1_3(datasets: Mapping[str, xr.Dataset], measured: Mapping[str, float]) -
         one = data.sel(picture=name)
         _contours(ax, one)
         ax.set_title(f"{words[0].upper()}{words[1:]}: Dice {measured[f'dice_{name}']:.4f}")
-    for (name, words), colour, dashes in zip(NAMES.items(), style.OKABE_ITO, ("-", "--"), strict=False):
+    for (name, words), colour, dashes in zip(NAMES.items(), style.OKABE_ITO[::2], ("-", "--"), strict=False):
         one = data.sel(picture=name)
         energy = one["energy"].values[np.isfinite(one["energy"].values)]
         fresh = np.flatnonzero(one["redistanced"].values[: energy.size] == 1)
@@ -28,7 +28,11 @@ def fig_1_3(datasets: Mapping[str, xr.Dataset], measured: Mapping[str, float]) -
         axes[2].plot(steps[fresh], energy[fresh], ".", color=colour, markersize=5)
     axes[2].set(xlabel="steps", ylabel="energy / first energy [1]", title="Falls in each step; dots: redistanced")
     axes[2].legend()
-    style.note(figure, datasets, "noise 0.3 of the contrast; first contour: the outermost line")
+    style.note(
+        figure,
+        datasets,
+        "noise 0.3 of the contrast; contours from dark (first) to light, thick the last; the second chose no parameter",
+    )
     return figure
 
 
@@ -36,12 +40,12 @@ def _contours(ax, one: xr.Dataset) -> None:
     """The picture in grey, and its contours from the first to the last; the last one thick."""
     cells = round(one["image"].size ** 0.5)
     picture = one["image"].values.reshape(cells, cells)
-    ax.imshow(picture, extent=(0, 1, 0, 1), cmap="gray", vmin=-0.9, vmax=1.9, interpolation="nearest")
+    ax.imshow(picture, extent=(0, 1, 0, 1), cmap="gray", vmin=-3.5, vmax=1.6, interpolation="nearest")
     frames = one["contour_frame"].values
     count = int(np.nanmax(frames)) + 1
     for k, colour in enumerate(style.shades(count - 1)):
         here = frames == k
-        ax.plot(one["contour_x"].values[here], one["contour_y"].values[here], color=colour, linewidth=1.3)
+        ax.plot(one["contour_x"].values[here], one["contour_y"].values[here], color=colour, linewidth=1.6)
     here = frames == count - 1
     ax.plot(one["contour_x"].values[here], one["contour_y"].values[here], color=style.OKABE_ITO[1], linewidth=2.2)
     ax.set(xlim=(0, 1), ylim=(0, 1), xlabel="x [side]", ylabel="y [side]", aspect="equal")

@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fsiwork.core.contours import Segmentation, segment
 from fsiwork.core.grid import Grid
+from fsiwork.core.segmentation import Segmentation, segment, surrounding
 from fsiwork.core.shapes import Ball, Box, Capsule, Ellipsoid, Polygon, Torus
 from fsiwork.layout import Geometry, contour
 
 NOISE = 0.3  # standard deviation, in parts of the contrast
-FRAMES = 6
+FRAMES = 7
+EVERY = 8  # steps
 
 
 def _clover(x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -68,8 +69,8 @@ def segmented(_scene, point: dict[str, Any]) -> dict[str, Any]:
 
     cells, name = int(point["cells"]), point["picture"]
     clean, image = picture(name, cells)
-    frames: list[np.ndarray] = []
-    found = segment(image, watch=lambda step, state, fresh: frames.append(state.phi) if fresh else None)
+    frames = [surrounding(image.shape)]
+    found = segment(image, watch=lambda step, state, fresh: None if step % EVERY or fresh else frames.append(state.phi))
     mask = found.phi < 0
     out: dict[str, Any] = {
         "dice": 2 * int((mask & clean).sum()) / int(mask.sum() + clean.sum()),
@@ -97,9 +98,10 @@ def largest_rise(found: Segmentation) -> float:
 
 
 def _shown(image: np.ndarray, frames: list[np.ndarray], found: Segmentation) -> dict[str, Any]:
-    """The image, row by row from below, scaled by the levels found; points of the contour at some redistancings and at
+    """The image, row by row from below, scaled by the levels found; points of the contour on its way and at
     the end, pieces parted by NaN; the energy after each step in parts of the first."""
-    chosen = np.unique(np.linspace(0, len(frames) - 1, FRAMES - 1).round().astype(int))
+    way = [0] + [k for k in range(1, len(frames)) if ((frames[k] < 0) != (frames[k - 1] < 0)).mean() > 0.001]
+    chosen = np.array(way)[np.linspace(0, len(way) - 1, min(FRAMES, len(way))).round().astype(int)]
     grid = Geometry(image.shape, 1 / image.shape[0], (0.0, 0.0), (False, False))
     points: list[list[float]] = [[], [], []]
     for number, phi in enumerate([*(frames[k] for k in chosen), found.phi]):
