@@ -131,21 +131,22 @@ def redistancing(datasets: Mapping[str, xr.Dataset]) -> dict[str, float]:
 
 
 def rows(datasets: Mapping[str, xr.Dataset], measured: Mapping[str, float]) -> tuple[list[str], list[list]]:
-    """A row for each method: errors and ms at N = 256 and at the finest, order, drift."""
+    """A row for each method: orders, errors and ms at N = 256 and at the finest, drift; a dash where it has none."""
     data, moved = datasets["redistancing"].sortby("cells"), datasets["redistancing_drift"]["moved"].sortby("repeats")
     finest, repeats = int(data["cells"][-1]), [int(k) for k in moved["repeats"]]
     parts = [(256, name) for name in ("near", "outside", "box", "ms")]
     if finest != 256:
         parts.append((finest, "ms"))
     words = {"near": f"error within {NEAR} Δx", "outside": "error outside", "box": "error in the box", "ms": "ms"}
-    header = ["method", "order", *(f"{words[name]}, N = {cells}" for cells, name in parts)]
+    header = ["method", "order", "order outside", *(f"{words[name]}, N = {cells}" for cells, name in parts)]
     header += [f"moved after {k} [Δx]" for k in repeats]
     lines = []
     for name in data["method"].values:
         at = data.sel({"method": name})
-        values = [measured[f"{str(name).replace('-', '_')}_order"]]
+        label = str(name).replace("-", "_")
+        values = [measured[f"{label}_order"], measured[f"{label}_outside_order"]]
         values += [float(at[variable].sel(cells=cells)) for cells, variable in parts]
         known = name in moved["method"]
         values += [float(moved.sel({"method": name, "repeats": k})) if known else np.nan for k in repeats]
-        lines.append([str(name), *(float(f"{v:.3g}") for v in values)])
+        lines.append([str(name), *("–" if np.isnan(v) else float(f"{v:.3g}") for v in values)])
     return header, lines

@@ -12,7 +12,7 @@ from fsiwork.core.kernels import point
 
 FAR, TRIAL, KNOWN, SEED, WALL = range(5)
 
-# `nnan` and infinite distances do not go together, nor does reassociation with the heap's order: plain arithmetic.
+# One node after the other: nothing to do in parallel.
 serial = njit(error_model="numpy", cache=True)
 
 
