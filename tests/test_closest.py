@@ -307,3 +307,19 @@ def test_benchmarks_beside_scikit_fmm(monkeypatch, there):
             assert row["measured"] > 0
             assert (row["pass"] is None) == (not there)
             assert ("not installed" in row["note"]) == (not there)
+
+
+@pytest.mark.parametrize("method", CLOSEST)
+@pytest.mark.parametrize("dim", [2, 3])
+def test_noise(method, dim):
+    """Any field: signs stay, nodes beside a change of sign are a cell from the interface at most. Between nodes the
+    distance changes by no more than one cell and another: one may see a line that no sign shows, the other not."""
+    grid = Grid((14,) * dim, 1.0)
+    phi = np.random.default_rng(dim).normal(size=grid.size)
+    found = redistance(grid, phi, method)
+    assert (np.sign(found) == np.sign(phi)).all()
+    q, d = grid.padded(phi), grid.padded(np.abs(found))
+    for a in range(dim):
+        change = np.moveaxis(np.diff(np.signbit(q), axis=a), a, 0)
+        assert np.moveaxis(d, a, 0)[:-1][change].max() <= 1
+        assert np.abs(np.diff(d, axis=a)).max() < 2

@@ -29,28 +29,32 @@ def line(q, n, i, j):
 
 @serial
 def scan(q, n, out, far):
-    """Fill ``out`` with ± far by the sign of q; the nodes next to a change of sign or q = 0; whether q is finite."""
-    near, count, sound, last = np.empty(q.size, np.int32), 0, 0.0, n[2] - 1
+    """Fill ``out`` with ± far by the sign of q; nodes next to a change of sign or with q = 0; whether q is finite."""
+    near, count, sound = np.empty(q.size, np.int32), 0, 0.0
+    flag, edge = np.zeros(n[2], np.uint8), np.empty(n[2] + 2)
+    left, right = edge, edge[2:]
     for i in range(n[0]):
         for j in range(n[1]):
             here, o = line(q, n, i, j), line(out, n, i, j)
-            south, north, below, above = (
-                line(q, n, i - 1, j),
-                line(q, n, i + 1, j),
-                line(q, n, i, j - 1),
-                line(q, n, i, j + 1),
-            )
+            south, north = line(q, n, i - 1, j), line(q, n, i + 1, j)
+            below, above = line(q, n, i, j - 1), line(q, n, i, j + 1)
+            edge[0], edge[n[2] + 1] = here[0], here[n[2] - 1]
+            edge[1 : n[2] + 1] = here
+            some = 0
             for k in range(n[2]):
                 o[k] = -far if here[k] < 0 else far
                 sound += 0 * here[k]
             for k in range(n[2]):
                 minus = here[k] < 0
                 change = ((south[k] < 0) ^ minus) | ((north[k] < 0) ^ minus) | ((below[k] < 0) ^ minus)
-                change |= ((above[k] < 0) ^ minus) | (here[k] == 0)
-                change |= ((here[max(k - 1, 0)] < 0) ^ minus) | ((here[min(k + 1, last)] < 0) ^ minus)
-                if change:
-                    near[count] = (i * n[1] + j) * n[2] + k
-                    count += 1
+                change |= ((above[k] < 0) ^ minus) | ((left[k] < 0) ^ minus) | ((right[k] < 0) ^ minus)
+                flag[k] = change | (here[k] == 0)
+                some += flag[k]
+            if some > 0:
+                for k in range(n[2]):
+                    if flag[k]:
+                        near[count] = (i * n[1] + j) * n[2] + k
+                        count += 1
     return near[:count].copy(), sound == 0
 
 
