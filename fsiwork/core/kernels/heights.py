@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
-from fsiwork.core.kernels import FASTMATH, point
+from fsiwork.core.kernels import FASTMATH, batches, point
 from fsiwork.core.kernels.quintic import (
     HALVES,
     LEVEL,
@@ -175,15 +175,44 @@ def cell(stack, top, size, depth, scratch, total):
         total[1] += part[1] * length * length
 
 
+@point
+def flush(w, count, stack, size, depth, scratch, total):
+    """Adds the ``count`` cells that wait in ``w``; one by one those that are not simple."""
+    for at in range(count, batches.SIZE):
+        for k in range(N * N):
+            w[k * batches.SIZE + at] = 1.0
+    batches.measure(w)
+    for at in range(count):
+        if w[batches.KIND + at] == 0:
+            for k in range(N * N):
+                stack[0, k // N, k % N] = w[batches.CELL + k * batches.SIZE + at]
+            size[0], depth[0] = 1.0, 0
+            cell(stack, 1, size, depth, scratch, total)
+        else:
+            total[0] += w[batches.LENGTH + at]
+            total[1] += w[batches.INSIDE + at]
+
+
+@point
+def rim(q, i, j, low, stack, size, depth, scratch, total):
+    """Adds the part of a cell at the edge of the box that lies inside."""
+    a, b = q.shape[0] - low - 2, q.shape[1] - low - 2
+    c, work = scratch[0], scratch[1]
+    change(TO_COEFFICIENTS, q[i - 2 : i + 4, j - 2 : j + 4], TO_COEFFICIENTS, work, c)
+    size[:4], depth[:4] = 0.5, 1
+    first, last = (int(i == low), int(j == low)), (1 - int(i == a), 1 - int(j == b))
+    cell(stack, divide(c, stack, 0, first, last, work), size, depth, scratch, total)
+
+
 @serial
 def length_and_area(q, low, h):
     """Length of φ = 0 and area of φ < 0 over the cells between nodes [low, n - low), of those at the ends the inner
     halves: the box whose sides lie midway between the nodes low and low + 1. ``low`` is 2 or more."""
     stack, size = np.empty((4 * DEPTH + 4, N, N)), np.empty(4 * DEPTH + 4)
-    depth, total = np.empty(4 * DEPTH + 4, np.int64), np.zeros(2)
-    c, work, found, part = np.empty((N, N)), np.empty((N, N + 2)), np.empty(2 * N + 1), np.empty(2)
+    depth, total, w = np.empty(4 * DEPTH + 4, np.int64), np.zeros(2), np.empty(batches.ROOM)
+    scratch = np.empty((N, N)), np.empty((N, N + 2)), np.empty(2 * N + 1), np.empty(2)
     a, b, flag = q.shape[0] - low - 2, q.shape[1] - low - 2, np.empty(q.shape[1] - 2 * low - 1, np.bool_)
-    full = 0.0
+    full, waiting = 0.0, 0
     for i in range(low, a + 1):
         count = candidates(flag, q[i - 1, low - 2 :], q[i, low - 2 :], q[i + 1, low - 2 :], q[i + 2, low - 2 :])
         ends = ((q[i, low] <= 0) & (not flag[0])) + ((q[i, b] <= 0) & (not flag[b - low]))
@@ -191,12 +220,15 @@ def length_and_area(q, low, h):
         for j in range(low, b + 1):
             if not flag[j - low]:
                 continue
-            change(TO_COEFFICIENTS, q[i - 2 : i + 4, j - 2 : j + 4], TO_COEFFICIENTS, work, stack[0])
-            size[0], depth[0], top = 1.0, 0, 1
             if i in (low, a) or j in (low, b):
-                c[:] = stack[0]
-                size[:4], depth[:4] = 0.5, 1
-                first, last = (int(i == low), int(j == low)), (1 - int(i == a), 1 - int(j == b))
-                top = divide(c, stack, 0, first, last, work)
-            cell(stack, top, size, depth, (c, work, found, part), total)
+                rim(q, i, j, low, stack, size, depth, scratch, total)
+                continue
+            for k in range(N):
+                for l in range(N):
+                    w[(k * N + l) * batches.SIZE + waiting] = q[i - 2 + k, j - 2 + l]
+            waiting += 1
+            if waiting == batches.SIZE:
+                flush(w, waiting, stack, size, depth, scratch, total)
+                waiting = 0
+    flush(w, waiting, stack, size, depth, scratch, total)
     return total[0] * h, (total[1] + full) * h * h
