@@ -38,6 +38,9 @@ def carried(name, how):
     found = {f"bodies__{i}__transport__carry": how for i, body in enumerate(made.bodies) if body.kind != "markers"}
     if how == "map":
         found |= {f"bodies__{i}__redistance": None for i, body in enumerate(made.bodies) if body.kind == "interface"}
+        changed = {"film": 0.0, "keep_volume": False}  # what changes φ has no place in a map
+        bubbles = [i for i, body in enumerate(made.bodies) if body.kind == "bubbles"]
+        found |= {f"bodies__{i}__{key}": value for i in bubbles for key, value in changed.items()}
     fields = [field for field in made.output.fields if field != "Y"] + ["Y"] * (how == "map" and bool(found))
     return found | ({"output__fields": fields} if found else {})
 

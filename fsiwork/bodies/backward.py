@@ -10,7 +10,8 @@ from fsiwork.core.transport import Transport
 
 
 class BackwardMap:
-    """Components of Y [length] at centres, flat; along a periodic direction x - Y is periodic, Y grows by the period.
+    """Components of Y [length] at centres, flat. Along a periodic direction x - Y is periodic: Y grows by the period;
+    and beyond an inflow side it is that of the first cell: the fluid outside goes along as at the inlet.
 
     Parameters
     ----------
@@ -24,7 +25,7 @@ class BackwardMap:
         self._carriers = []
         for a in grid.axes:
             carrier = copy.copy(transport)
-            carrier.edges = _Growing(edges, a) if edges.periodic(a) else edges
+            carrier.edges = _Growing(edges, a)
             self._carriers.append(carrier)
 
     def move(self, u: list[np.ndarray], dt: float) -> None:
@@ -42,15 +43,18 @@ class BackwardMap:
 
 
 class _Growing:
-    """Ghosts of component ``a`` in a box that is periodic along ``a``: Y(x + L) = Y(x) + L."""
+    """Ghosts of component ``a``: Y(x + L) = Y(x) + L where periodic, Y(x + d) = Y(x) + d beyond an inflow side."""
 
     def __init__(self, edges: Edges, a: int):
         self.edges, self.a = edges, a
+        g, kinds = edges.grid, [side.kind for side in edges.sides[a]]
+        beyond = {"periodic": np.full(GHOSTS, g.length[a]), "inflow": g.h * np.arange(1, GHOSTS + 1)}
+        self._growth = [beyond.get(kind, np.zeros(GHOSTS)).reshape(-1, *[1] * (g.dim - 1)) for kind in kinds]
 
     def fill_scalar(self, Y: np.ndarray, rule: str) -> None:
-        """As `Edges.fill_scalar`, with the period added."""
+        """As `Edges.fill_scalar`, with the growth added."""
         self.edges.fill_scalar(Y, rule)
-        g = self.edges.grid
-        lines = np.moveaxis(g.padded(Y), self.a, 0)
-        lines[:GHOSTS] -= g.length[self.a]
-        lines[-GHOSTS:] += g.length[self.a]
+        low, high = self._growth
+        lines = np.moveaxis(self.edges.grid.padded(Y), self.a, 0)
+        lines[:GHOSTS] -= low[::-1]
+        lines[-GHOSTS:] += high

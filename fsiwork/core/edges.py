@@ -56,14 +56,22 @@ class Edges:
         return tuple(ends)
 
     def fill_scalar(self, q: np.ndarray, rule: str) -> None:
-        """Fill the ghosts of a centre field: ``linear`` extrapolation or ``mirror`` (zero normal derivative)."""
+        """Fill the ghosts of a centre field: ``linear`` extrapolation or ``mirror`` (zero normal derivative).
+
+        Linear but for inflow sides, which take the value of the first cell: a slope taken from within would decide
+        what enters, drift, and bring φ < 0 out of nothing; so what stands at an inlet goes on coming in.
+        """
         for a, s in enumerate(self.grid.strides):
             line, n = self._lines[a], self.grid.n[a]
             if self.periodic(a):
                 self._wrap(q, a)
             elif rule == "linear":
-                extrapolate(q, line, 0, -s, GHOSTS)
-                extrapolate(q, line, (n - 1) * s, s, GHOSTS)
+                for edge, step, side in ((0, -s, self.sides[a][0]), ((n - 1) * s, s, self.sides[a][1])):
+                    if side.kind == "inflow":
+                        for k in range(1, GHOSTS + 1):
+                            copy(q, line, edge + k * step, edge, step, 1)
+                    else:
+                        extrapolate(q, line, edge, step, GHOSTS)
             else:
                 reflect(q, line, -s, 0, -s, GHOSTS, 1.0, ZERO)
                 reflect(q, line, n * s, (n - 1) * s, s, GHOSTS, 1.0, ZERO)
