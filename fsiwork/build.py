@@ -58,6 +58,7 @@ def _membrane(spec, grid: Grid, edges: Edges) -> Membrane:
         carry=spec.transport.carry,
         inside=None if spec.inside is None else (spec.inside.density, spec.inside.viscosity),
         surface_mass=spec.surface_mass,
+        bending=spec.bending,
     )
 
 

@@ -1,8 +1,9 @@
 """Incompressible Navier-Stokes on the staggered grid: predict, project; second order in space and time.
 
 AB2 for advection, Crank-Nicolson for diffusion, incremental pressure with the rotational correction. What a body may
-change between `begin` and `predict` are the slots ``rho``, ``mu``, ``force`` and ``stiffness``. With variable ρ or μ
-`core.mixture` does diffusion (backward Euler then, unless explicit) and, if ρ varies, the projection.
+change between `begin` and `predict` are the slots ``rho``, ``mu``, ``force``, ``stiffness`` and ``bending_stiffness``
+(the last counts for constant ρ and μ only). With variable ρ or μ `core.mixture` does diffusion (backward Euler then,
+unless explicit) and, if ρ varies, the projection.
 """
 
 import numpy as np
@@ -12,6 +13,7 @@ from fsiwork.core.grid import GHOSTS, Grid
 from fsiwork.core.kernels import flow as kernels
 from fsiwork.core.mixture import Mixture
 from fsiwork.core.poisson import Direct, Lines
+from fsiwork.core.spectral import Spectral
 
 LINES_UP_TO = 4.0  # α/Δx² up to which the line factorisation serves (MEASURED-poisson 2); beyond it the exact solve
 ADVECTION = {"upwind5": 1.0, "central": 1.0, "none": 0.0}
@@ -43,7 +45,7 @@ class Flow:
         self.dt_old = 0.0  # no history yet: the first step is Euler's
         self.guess: list[np.ndarray] | None = None  # velocity of the pass before, in iterated steps
         self.rho = self.mu = None  # None: constant
-        self.stiffness = 0.0
+        self.stiffness = self.bending_stiffness = 0.0
         self._star = [grid.field() for _ in grid.axes]
         self._old = [grid.field() for _ in grid.axes]
         self._psi, self._minus_div = np.zeros(grid.n), np.zeros(grid.n)
@@ -90,7 +92,7 @@ class Flow:
     def begin(self) -> None:
         """ρ, μ of the fluid; nothing acts yet."""
         self.rho = self.mu = None
-        self.stiffness = 0.0
+        self.stiffness = self.bending_stiffness = 0.0
         for f in self._force or ():
             f.fill(0.0)
 
@@ -102,7 +104,7 @@ class Flow:
             self._mixed = self._mixed or Mixture(self.grid, self.edges)
             self._mixed.prepare(self)
         kappa = self.theta * dt * self.viscosity / self.density + self.stiffness * dt**2
-        implicit = kappa > 0.0 or (self.theta > 0.0 and not constant)
+        implicit = kappa > 0.0 or self.bending_stiffness > 0.0 or (self.theta > 0.0 and not constant)
         for c in self.grid.axes:
             self._explicit_part(c, dt, increment=implicit)
         for c in self.grid.axes if implicit else ():
@@ -182,14 +184,17 @@ class Flow:
         )
 
     def _implicit_part(self, c: int, kappa: float) -> None:
-        """u* = u + (1 - κΔ)⁻¹ increment, on the faces inside."""
+        """u* = u + (1 - κΔ + βΔ²)⁻¹ increment, on the faces inside; β = c_b Δt² of bodies that resist bending."""
         start, n, shape = self._rows[c]
         d = self._compact(c, shape)
+        beta = self.bending_stiffness * self.dt**2
         if self.guess is not None:
             pull = -self.stiffness * (self.dt / self.grid.h) ** 2
             kernels.add_laplacian(self._star[c], self.u[c], self.guess[c], start, n, self.grid.strides, pull)
         kernels.gather(d.reshape(-1), self._star[c], start, n)
-        if self.stiffness == 0.0 and kappa <= LINES_UP_TO * self.grid.h**2:
+        if beta > 0.0:
+            d = self._solver("spectral", c, shape).solve(d, 1.0, kappa, beta)
+        elif self.stiffness == 0.0 and kappa <= LINES_UP_TO * self.grid.h**2:
             d = self._solver("lines", c, shape).solve(d, kappa)
         else:
             d = self._solver("exact", c, shape).solve(d, 1.0, kappa)
@@ -261,6 +266,7 @@ class Flow:
                 "pressure": lambda: Direct(g.n, g.h, e.ends_pressure()),
                 "exact": lambda: Direct(shape, g.h, e.ends_velocity(c)),
                 "lines": lambda: Lines(shape, g.h, e.ends_velocity(c)),
+                "spectral": lambda: Spectral(shape, g.h, e.ends_velocity(c)),
             }
             self._solvers[key] = make[kind]()
         return self._solvers[key]

@@ -88,7 +88,7 @@ class Width(Spec):
 class Transport(Spec):
     """How the interface is carried: φ itself (field) or the backward map Y with φ = φ₀(Y) (map)."""
 
-    scheme: Literal["weno5", "weno-z", "upwind5", "upwind1"] = "weno5"
+    scheme: Literal["weno5", "weno-z", "upwind5", "upwind1", "semi-lagrangian"] = "weno5"
     tableau: Literal["ssp-rk3", "ssp-rk2", "euler"] = "ssp-rk3"
     carry: Literal["field", "map"] = "field"
     dtype: Literal["float64", "float32"] = "float64"
@@ -97,8 +97,8 @@ class Transport(Spec):
 class Membrane(Spec):
     """An elastic interface that reacts to its change of area (Chapter 3); with a linear law, a drop.
 
-    ``stretch`` is |∇φ₀|, the first ratio of current to rest area; ``surface_mass`` is per rest area.
-    ``form`` and ``dirac`` are chosen by the law unless an expert overrides them.
+    ``stretch`` is |∇φ₀|, the first ratio of current to rest area; ``surface_mass`` is per rest area; ``bending`` is the
+    modulus k of the energy ½kH². ``form`` and ``dirac`` are chosen by the law unless an expert overrides them.
     """
 
     kind: Literal["membrane"] = "membrane"
@@ -111,7 +111,15 @@ class Membrane(Spec):
     dirac: Literal["auto", "plain", "renormalised"] = "auto"
     inside: Inside | None = None
     surface_mass: NotNegative = 0.0
+    bending: NotNegative = 0.0
     transport: Transport = Transport()
+
+    @sense
+    def _bending_fits(self) -> Iterator[Fault]:
+        if self.bending and self.coupling == "iterated":
+            yield ("coupling",), "with bending it must be explicit, semi-implicit or stabilised, got 'iterated'"
+        if self.bending and self.coupling == "stabilised" and (self.inside or self.surface_mass):
+            yield ("coupling",), "with bending and another fluid inside it must be explicit, got 'stabilised'"
 
 
 class Bubble(Spec):
