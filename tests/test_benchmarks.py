@@ -147,7 +147,7 @@ def test_command_writes_and_keeps_rows(monkeypatch, tmp_path, capsys):
 def test_every_mark_of_the_suite_is_named(tmp_path):
     names = {"flow_2d", "flow_2d_implicit", "flow_3d", "membrane_2d", "poisson_2d", "stage_2d", "stage_3d"}
     assert set(command.suite(tmp_path)) == names | {
-        "python_share", "allocation", "workflow_parse", "freefem", "cold_start"
+        "python_share", "allocation", "workflow_parse", "freefem", "cold_start", "fmm_full", "fmm_band", "fmm_3d",
     }  # fmt: skip
 
 
