@@ -24,7 +24,7 @@ def fig_1_5(datasets: Datasets, measured: Measured) -> Figure:
     figure, axes = style.sheet(2, 3, size=(9.4, 6.8), sharex=True, sharey=True)
     for row, n in zip(axes, cells, strict=True):
         for ax, (method, (label, colour, _)) in zip(row, METHODS.items(), strict=True):
-            one = data.sel(method=method, cells=n)
+            one = data.sel(carried=method, cells=n)
             ax.fill(*_filled(one["x"].values, one["y"].values), color=colour, alpha=0.75, linewidth=0)
             ax.plot(exact["x"], exact["y"], label="exact", **EXACT)
             area, length = ((measured[f"{q}_{method}_{n}"]) for q in ("area", "length"))
@@ -58,7 +58,7 @@ def fig_1_6(datasets: Datasets, measured: Measured) -> Figure:
     for ax, (method, (label, *_)) in zip(axes, METHODS.items(), strict=True):
         name = "length" if method == "map" else "renormalised"
         for n, colour, mark in zip(cells, style.shades(len(cells)), "osv^", strict=False):
-            one = data.sel(method=method, cells=n)
+            one = data.sel(carried=method, cells=n)
             ax.plot(one["t"], one[name], color=colour, marker=mark, markevery=2, label=f"N = {n}")
         ax.plot(exact["t"], exact["length"], label="exact", **EXACT)
         how = "geometric on a finer grid" if method == "map" else "renormalised D"
@@ -76,7 +76,7 @@ def back_again(datasets: Datasets, measured: Measured) -> Figure:
     figure, axes = style.sheet(2, 3, size=(9.4, 6.6))
     for k, when in enumerate(("half", "end")):
         for method, (label, colour, _) in METHODS.items():
-            one = data.sel(method=method, cells=cells[-1])
+            one = data.sel(carried=method, cells=cells[-1])
             axes[k, 0].plot(one[f"{when}_x"], one[f"{when}_y"], color=colour, label=label, linewidth=1.1)
         word = {"half": "half way", "end": "back"}[when]
         axes[k, 0].set(aspect="equal", title=f"{word}, N = {cells[-1]}", xlabel="x [length]", ylabel="y [length]")
@@ -84,7 +84,7 @@ def back_again(datasets: Datasets, measured: Measured) -> Figure:
     names |= {"l1": "L1 [Δx]", "shape": "mean distance of the line [Δx]"}
     for ax, (name, label) in zip(axes[:, 1:].ravel(), names.items(), strict=True):
         for method, (_, colour, marker) in METHODS.items():
-            values = np.abs(data[name].sel(method=method).sel(cells=cells))
+            values = np.abs(data[name].sel(carried=method).sel(cells=cells))
             ax.plot(cells, values.where(values > 0), color=colour, marker=marker)
         ax.set(xscale="log", yscale="log", title=label, xlabel="N, cells along a side")
         ax.set_xticks(cells, [str(n) for n in cells])

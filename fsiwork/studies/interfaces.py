@@ -104,9 +104,9 @@ def fig_1_5(datasets: Mapping[str, xr.Dataset]) -> dict[str, float]:
     """Errors of area and length at the end in percent, ``area_METHOD_N`` and ``length_METHOD_N``; sizes for the map."""
     data, exact = datasets["blob"], datasets["blob_exact"]
     out = {}
-    for method in data["method"].values:
+    for method in data["carried"].values:
         for n in data["cells"].values:
-            for name, error in zip(("area", "length"), _errors(data, exact, method=method, cells=n), strict=True):
+            for name, error in zip(("area", "length"), _errors(data, exact, carried=method, cells=n), strict=True):
                 out[f"{name}_{method}_{n}"] = abs(error) if method == "map" else error
     return out
 
@@ -117,9 +117,9 @@ def fig_1_6(datasets: Mapping[str, xr.Dataset]) -> dict[str, float]:
     out = {}
     for method in ("plain", "redistanced"):
         for n in data["cells"].values:
-            out[f"{method}_{n}"] = float(data["renormalised"].sel(method=method, cells=n)[-1])
+            out[f"{method}_{n}"] = float(data["renormalised"].sel(carried=method, cells=n)[-1])
     for n in data["cells"].values:
-        ours = data["length"].sel(method="map", cells=n)
+        ours = data["length"].sel(carried="map", cells=n)
         out[f"map_{n}"] = float(100 * abs(ours / exact["length"].values - 1).max(skipna=False))
     at = [int(np.argmin(np.abs(exact["t"].values - t))) for t in LENGTHS]
     deviations = exact["length"].values[at] / np.array(list(LENGTHS.values())) - 1
@@ -194,9 +194,9 @@ def back_again(datasets: Mapping[str, xr.Dataset]) -> dict[str, float]:
     """``QUANTITY_METHOD_N`` of the one study: |volume| and mismatch in percent, l1 and shape in Δx, map."""
     (data,) = datasets.values()
     out = {}
-    for method in data["method"].values:
+    for method in data["carried"].values:
         for n in data["cells"].values:
-            one = data.sel(method=method, cells=n)
+            one = data.sel(carried=method, cells=n)
             values = {name: float(one[name]) for name in ("volume", "mismatch", "l1", "shape", "map")}
             signed = {"volume_signed": values["volume"]} | values | {"volume": abs(values["volume"])}
             out |= {f"{name}_{method}_{n}": v for name, v in signed.items() if name != "map" or method == "map"}
@@ -208,9 +208,9 @@ def rows_back(datasets: Mapping[str, xr.Dataset], measured: Mapping[str, float])
     (data,) = datasets.values()
     header = ["method", "N", "change of volume [%]", "mismatch [%]", "L1 [Δx]", "shape [Δx]", "CPU seconds"]
     rows = []
-    for method in data["method"].values:
+    for method in data["carried"].values:
         for n in data["cells"].values:
-            one = data.sel(method=method, cells=n)
+            one = data.sel(carried=method, cells=n)
             numbers = (float(one[name]) for name in ("volume", "mismatch", "l1", "shape", "cpu_seconds"))
             rows.append([str(method), int(n), *(float(f"{v:.3g}") for v in numbers)])
     return header, rows
@@ -219,5 +219,5 @@ def rows_back(datasets: Mapping[str, xr.Dataset], measured: Mapping[str, float])
 def enright(datasets: Mapping[str, xr.Dataset]) -> dict[str, float]:
     """As `back_again`, and ``mismatch_ratio`` of the map between the two finest grids (NaN for one)."""
     out, (data,) = back_again(datasets), datasets.values()
-    mismatch = data["mismatch"].sel(method="map").sortby("cells").values
+    mismatch = data["mismatch"].sel(carried="map").sortby("cells").values
     return out | {"mismatch_ratio": float(mismatch[-1] / mismatch[-2]) if mismatch.size > 1 else math.nan}
