@@ -92,6 +92,22 @@ def test_a_time_dependent_velocity_is_of_order_four():
     assert slope(1 / steps, errors) > 3.8
 
 
+@pytest.mark.parametrize("slopes", [True, False])
+def test_splits_on_the_way_out_and_joins_on_the_way_back_keep_the_circle(slopes):
+    line, gradient, most = circle(markers.CENTRE, 0.15, 64, slopes), markers.gradient if slopes else None, 0
+    for k in range(400):
+        forth = k < 200
+        sign = 1 if forth else -1
+        slope_of = gradient and (lambda x, t, sign=sign: sign * gradient(x))
+        line = carry(line, lambda x, t, sign=sign: sign * markers.velocity(x), 0.0, 0.01, slope_of)
+        line = line.split(0.02, 0.3) if forth else line.join(0.02, 0.3)
+        most = max(most, line.theta.size)
+    angle = 2 * np.pi * line.theta
+    away = line.x - 0.15 * np.stack([np.cos(angle), np.sin(angle)]) - np.reshape(markers.CENTRE, (2, 1))
+    assert np.abs(away).max() < 0.15e-5
+    assert line.theta.size < 0.5 * most
+
+
 def test_the_gradient_is_that_of_the_velocity():
     x, h = np.random.default_rng(1).random((2, 50)), 1e-5
     for j in range(2):
@@ -132,6 +148,8 @@ def test_what_is_refused():
         carry(line, lambda x, t: x, 0.0, 0.1)
     with pytest.raises(ValueError, match="positive"):
         line.split(0.0)
+    with pytest.raises(ValueError, match="more than 1000000 markers"):
+        line.split(1e-6)
     broken = Line(line.theta, np.where(line.theta == 0.5, np.nan, line.x))
     with pytest.raises(ValueError, match="2 segments of the line are not finite"):
         broken.split(0.1)

@@ -10,6 +10,7 @@ import numpy as np
 
 Velocity = Callable[[np.ndarray, float], np.ndarray]
 FEWEST = 8  # markers that one local interpolant reads
+MOST = 1_000_000  # beyond this a line is not resolved but torn, as by tangents that do not belong to it
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 
 
@@ -79,12 +80,15 @@ class Line:
         """A marker more in the middle (of θ) of segments longer than ``longest`` [length] or turning by more than
         ``sharpest`` [rad], until there is none; at a kink segments are no longer cut below a thousandth of ``longest``.
 
-        Raises ValueError when ``longest`` or ``sharpest`` is not positive, or when a marker is not finite.
+        Raises ValueError when ``longest`` or ``sharpest`` is not positive, when a marker is not finite, or beyond a
+        million markers.
         """
         if not (longest > 0 and sharpest > 0):
             raise ValueError(f"the longest segment and the sharpest turn must be positive, got {longest}, {sharpest}")
         line = self
         while (cut := np.flatnonzero(line._too_coarse(longest, sharpest))).size:
+            if line.theta.size + cut.size > MOST:
+                raise ValueError(f"more than {MOST} markers: does the gradient belong to the velocity?")
             x, slope = line.at(0.5, cut)
             after = np.append(line.theta[1:], line.theta[0] + self.period)
             line = replace(
