@@ -20,8 +20,9 @@ TINY = 1e-300
 class Bubbles(Membrane):
     """Several bodies of fluid inside one interface φ = 0; what each brings goes with the flow.
 
-    The density inside, or the buoyancy, is a field of its own: at first that of the nearest bubble, then carried like
-    φ; with a map it is looked up at Y. So it keeps its value away from the seams where bubbles have merged.
+    The density inside, or the buoyancy, is at first that of the nearest bubble. The seams where two of them meet, zeros
+    of the differences of the distances, are carried like φ; with a map the bubble is looked up at Y. So density never
+    diffuses, and where bubbles have merged it jumps from cell to cell.
 
     Parameters
     ----------
@@ -39,6 +40,8 @@ class Bubbles(Membrane):
     Attributes
     ----------
     content : flat field of the density or buoyancy that counts where φ < 0
+    seams : flat fields, distance to the bubbles of one value less that to those of the first, a field for each further
+        value; none with a map
 
     Raises
     ------
@@ -77,7 +80,14 @@ class Bubbles(Membrane):
             transport=transport, coupling=coupling, carry=carry, inside=inside,
         )  # fmt: skip
         self.content = grid.field(transport.dtype)
-        self._look_up(self.map.home() if self.map else grid.points())
+        self.seams: list[np.ndarray] = []
+        self._kinds, self._kind = np.unique(self.values, return_inverse=True)
+        if self.map:
+            self._look_up(self.map.home())
+        else:
+            first, *others = self._distances(grid.points())
+            self.seams = [(q - first).astype(transport.dtype).ravel() for q in others]
+            self._choose()
         self._volume = self.volume() if keep_volume else None
 
     # --- verbs ------------------------------------------------------------------------------------------------
@@ -102,13 +112,13 @@ class Bubbles(Membrane):
                     flow.force[a][s:] -= 0.5 * flow.density * flow.gravity[a] * (lift[s:] + lift[:-s])
 
     def move(self, flow, dt: float) -> None:
-        """Carry φ (or Y) and the content."""
+        """Carry φ and the seams, or Y; break films and keep the volume."""
         super().move(flow, dt)
         if self.map:
             self._look_up(self.map.home())
-        elif self.values.min() < self.values.max():
-            self.transport.advance([self.content], flow.u, dt, "mirror")
-            np.clip(self.content, self.values.min(), self.values.max(), out=self.content)
+        elif self.seams:
+            self.transport.advance(self.seams, flow.u, dt, "linear")
+            self._choose()
         if self.film:
             self._break_films()
         if self._volume is not None:
@@ -183,10 +193,20 @@ class Bubbles(Membrane):
         x = np.stack([g.coordinate(a)[c] for a, c in enumerate(cells)], -1)
         return x - (phi[here] / np.maximum((slope**2).sum(1), TINY))[:, None] * slope
 
+    def _distances(self, x) -> list[np.ndarray]:
+        """Distances to the bubbles of each value."""
+        found = np.broadcast_arrays(*(distance(*x) for distance in self.shapes))
+        return [
+            np.minimum.reduce([q for q, k in zip(found, self._kind, strict=True) if k == j])
+            for j in range(self._kinds.size)
+        ]
+
     def _look_up(self, x):
-        nearest = np.argmin(np.broadcast_arrays(*(distance(*x) for distance in self.shapes)), axis=0)
-        self.grid.padded(self.content)[...] = self.values[nearest]
+        self.grid.padded(self.content)[...] = self._kinds[np.argmin(self._distances(x), axis=0)]
         self.edges.fill_scalar(self.content, "mirror")
+
+    def _choose(self):
+        self.content[:] = self._kinds[np.argmin([np.zeros_like(self.phi), *self.seams], axis=0)]
 
     def _sum(self, q: np.ndarray) -> float:
         """∫q over the box."""
@@ -197,4 +217,5 @@ class Bubbles(Membrane):
         return 1.0 - heaviside(self.phi, self.eps)
 
     def _named(self) -> dict[str, np.ndarray]:
-        return super()._named() | {"content": self.content}
+        seams = {f"seam_{k}": q for k, q in enumerate(self.seams, 1)}
+        return super()._named() | {"content": self.content} | seams
