@@ -130,12 +130,14 @@ def along(seed, at, count, step, p, i, j, k):
 
 @point
 def across(seed, at, count, back, p, i, j):
-    """Each of ``count`` nodes from ``at`` = (i, j, 0) on takes the seed of the node ``back`` from it if nearer."""
-    for k in range(count):
-        own, other = seed[at + k], seed[at + k + back]
-        gain = (p[own, 0] - i) ** 2 - (p[other, 0] - i) ** 2 + ((p[own, 1] - j) ** 2 - (p[other, 1] - j) ** 2)
-        gain += (p[own, 2] - k) ** 2 - (p[other, 2] - k) ** 2
-        seed[at + k] = other if gain > 0 else own
+    """Each of ``count`` nodes from ``at`` = (i, j, 0) on takes the nearest of its seed and those of the node ``back``
+    from it and of the two beside that. (One after the other, without a branch: faster than all in one.)"""
+    for shift in (0, -1, 1):
+        for k in range(max(-shift, 0), count - max(shift, 0)):
+            own, other = seed[at + k], seed[at + k + back + shift]
+            gain = (p[own, 0] - i) ** 2 - (p[other, 0] - i) ** 2 + ((p[own, 1] - j) ** 2 - (p[other, 1] - j) ** 2)
+            gain += (p[own, 2] - k) ** 2 - (p[other, 2] - k) ** 2
+            seed[at + k] = other if gain > 0 else own
 
 
 @serial
