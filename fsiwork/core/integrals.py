@@ -6,12 +6,13 @@ centres. The measures are for scale: any φ with the right zero line. A field th
 
 import math
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 
 from fsiwork.core import levelset
 from fsiwork.core.grid import GHOSTS, Grid
-from fsiwork.core.kernels import heights, integrals, volumes
+from fsiwork.core.kernels import batches, heights, integrals, volumes
 
 
 def _plane(grid: Grid, phi: np.ndarray) -> np.ndarray:
@@ -91,16 +92,19 @@ def length(grid: Grid, phi: np.ndarray, method: str = "geometric") -> float:
     return METHODS[method](grid, phi)
 
 
+@cache
+def _scratch() -> np.ndarray:
+    """Kept: gauges are taken every step."""
+    return np.empty(batches.ROOM)
+
+
 def length_and_area(grid: Grid, phi: np.ndarray) -> tuple[float, float]:
     """Length of φ = 0 [length] and area of φ < 0 [length²], sixth order where φ is smooth.
 
     In the box and no further: exact across a periodic side; beside others as good as the ghosts of φ, of which all
     three are read. Raises ValueError outside the plane.
     """
-    q = _plane(grid, phi)
-    if not np.isfinite(q).all():
-        return math.nan, math.nan
-    line, area = heights.length_and_area(q, GHOSTS - 1, grid.h)
+    line, area = heights.length_and_area(_plane(grid, phi), GHOSTS - 1, grid.h, _scratch())
     return float(line), float(area)
 
 
@@ -112,7 +116,5 @@ def area_and_volume(grid: Grid, phi: np.ndarray) -> tuple[float, float]:
     if grid.dim != 3:
         raise ValueError(f"areas are those of surfaces in space, got {grid.dim} directions")
     q = np.ascontiguousarray(grid.padded(phi), dtype=np.float64)
-    if not np.isfinite(q).all():
-        return math.nan, math.nan
     surface, volume = volumes.area_and_volume(q, GHOSTS - 1, grid.h)
     return float(surface), float(volume)

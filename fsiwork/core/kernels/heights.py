@@ -24,6 +24,7 @@ from fsiwork.core.kernels.quintic import (
     horner,
     ordered,
     roots,
+    sound,
 )
 
 serial = njit(error_model="numpy", fastmath=FASTMATH, cache=True)
@@ -205,11 +206,14 @@ def rim(q, i, j, low, stack, size, depth, scratch, total):
 
 
 @serial
-def length_and_area(q, low, h):
+def length_and_area(q, low, h, w):
     """Length of φ = 0 and area of φ < 0 over the cells between nodes [low, n - low), of those at the ends the inner
-    halves: the box whose sides lie midway between the nodes low and low + 1. ``low`` is 2 or more."""
+    halves: the box whose sides lie midway between the nodes low and low + 1. ``low`` is 2 or more. NaN if φ is
+    not finite. ``w``: `batches.ROOM` numbers to work with."""
+    if not sound(q):
+        return math.nan, math.nan
     stack, size = np.empty((4 * DEPTH + 4, N, N)), np.empty(4 * DEPTH + 4)
-    depth, total, w = np.empty(4 * DEPTH + 4, np.int64), np.zeros(2), np.empty(batches.ROOM)
+    depth, total = np.empty(4 * DEPTH + 4, np.int64), np.zeros(2)
     scratch = np.empty((N, N)), np.empty((N, N + 2)), np.empty(2 * N + 1), np.empty(2)
     a, b, flag = q.shape[0] - low - 2, q.shape[1] - low - 2, np.empty(q.shape[1] - 2 * low - 1, np.bool_)
     full, waiting = 0.0, 0

@@ -128,3 +128,12 @@ def ordered(x, count):
             x[m] = x[m - 1]
             m -= 1
         x[m] = value
+
+
+@point
+def sound(q):
+    """Whether all numbers of a contiguous array are finite; without an array of the answers."""
+    flat, total = q.ravel(), 0.0
+    for k in range(flat.size):
+        total += 0.0 * flat[k]
+    return total == 0.0

@@ -1,11 +1,13 @@
 """Area of the surface φ = 0 and volume inside it: the cells that it may pass, each a cube between eight nodes."""
 
+import math
+
 import numpy as np
 from numba import njit
 
 from fsiwork.core.kernels import FASTMATH, point
 from fsiwork.core.kernels.cubes import DEPTH, cell, change, divide
-from fsiwork.core.kernels.quintic import LEVEL, TO_COEFFICIENTS, N
+from fsiwork.core.kernels.quintic import LEVEL, TO_COEFFICIENTS, N, sound
 
 serial = njit(error_model="numpy", fastmath=FASTMATH, cache=True)
 
@@ -45,7 +47,10 @@ def candidates(flag, rows, low, n):
 @serial
 def area_and_volume(q, low, h):
     """Area of φ = 0 and volume of φ < 0 over the cells between nodes [low, n - low), of those at the ends the inner
-    halves: the box whose sides lie midway between the nodes low and low + 1. ``low`` is 2 or more."""
+    halves: the box whose sides lie midway between the nodes low and low + 1. ``low`` is 2 or more. NaN if φ is
+    not finite."""
+    if not sound(q):
+        return math.nan, math.nan
     count = 7 * DEPTH + 16
     stack, size, depth = np.empty((count, N, N, N)), np.empty(count), np.empty(count, np.int64)
     c, work, total = np.empty((N, N, N)), np.empty((N, N, N)), np.zeros(2)
