@@ -12,7 +12,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 prepare(threads=1)
 
-from benchmarks import freefem, poisson, redistancing, rows, stepping, workflow  # noqa: E402  after the threads are set
+from benchmarks import freefem, lengths, poisson, redistancing, rows, stepping, workflow  # noqa: E402  after the threads are set
 
 
 def suite(results: Path) -> dict:
@@ -24,6 +24,7 @@ def suite(results: Path) -> dict:
         "flow_3d": lambda: stepping.rate("flow_3d", flow(96, 3, "central", "explicit"), ">= 35"),
         "membrane_2d": lambda: stepping.rate("membrane_2d", membrane(512, 2), ">= 20"),
         "poisson_2d": poisson.poisson,
+        "geometric_length": lengths.geometric,
         "stage_2d": lambda: stepping.stages("stage_2d", membrane(512, 2)),
         "stage_3d": lambda: stepping.stages("stage_3d", membrane(96, 3)),
         "python_share": stepping.python_share,
