@@ -12,7 +12,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 prepare(threads=1)
 
-from benchmarks import freefem, lengths, poisson, redistancing, rows, stepping, workflow  # noqa: E402  after the threads are set
+from benchmarks import freefem, lengths, poisson, redistancing, rows, stepping, transport, workflow  # noqa: E402  after the threads are set
 
 
 def suite(results: Path) -> dict:
@@ -30,6 +30,11 @@ def suite(results: Path) -> dict:
         "python_share": stepping.python_share,
         "allocation": stepping.allocation,
         "workflow_parse": workflow.parse,
+        "weno_2d": lambda: transport.rate("weno_2d", "weno5", 256, 2, ">= 250"),
+        "weno_3d": lambda: transport.rate("weno_3d", "weno5", 64, 3, ">= 140"),
+        "upwind5_2d": lambda: transport.rate("upwind5_2d", "upwind5", 256, 2, ">= 500"),
+        "threads": transport.threads,
+        "band": transport.band,
         "fmm_full": redistancing.full,
         "fmm_band": redistancing.narrow,
         "fmm_3d": redistancing.space,

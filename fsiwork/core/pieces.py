@@ -28,6 +28,7 @@ class Pieces:
     ----------
     start, n : flat starts of the pieces and their one length, as `Grid.rows` gives for the whole box
     around : starts of all pieces that a stencil of three cells on either side of these reads
+    inner : whether all of these are away from the sides, so that no ghost is read
     steepest : largest |difference| of neighbours of φ
 
     Raises
@@ -48,7 +49,7 @@ class Pieces:
         self._across = 1 + (0 < length % self.n < GHOSTS)  # pieces that three cells along a row may reach into
         self._top = np.empty(self._starts.size)
         self.start = self.around = rows[:0]
-        self.steepest = 0.0
+        self.steepest, self.inner = 0.0, False
 
     def find(self, q: np.ndarray) -> None:
         """Clip ``q`` (flat, at centres, ghosts filled) and find the pieces of its band."""
@@ -65,6 +66,7 @@ class Pieces:
         for a in self.grid.axes:
             rough = spread(rough, a, self._across if a == self.grid.dim - 1 else GHOSTS)
         self.around = self._starts[np.flatnonzero(rough)]
+        self.inner = not any(rough.take((0, -1), axis=a).any() for a in self.grid.axes)
 
     def _rough(self, q: np.ndarray) -> np.ndarray:
         kernels.steepness(self._steep, q, *self.grid.rows(), self._strides, self.n)

@@ -117,7 +117,7 @@ class Transport:
                     rows = self._near(q)
                 now = self._step(q, u, dt / self.substeps, rule, rows)
                 some.copy(q, now, *rows)
-                self.edges.fill_scalar(q, rule)
+                self._fill(q, rule)
 
     @staticmethod
     def _check(scheme, tableau, centring, from_interface):
@@ -179,6 +179,10 @@ class Transport:
         usable = self.weighted and np.finfo(self.dtype).tiny < scale < np.inf
         self._k[3:] = (1 / scale, floor) if usable else 1.0
 
+    def _fill(self, q: np.ndarray, rule: str) -> None:
+        if not (self._pieces and self._pieces.inner):
+            self.edges.fill_scalar(q, rule)
+
     def _near(self, q: np.ndarray) -> tuple[np.ndarray, int]:
         """Starts and length of the pieces of the band of ``q``; the copies get what stencils read beside them."""
         self._pieces.find(q)
@@ -197,14 +201,14 @@ class Transport:
             halves = [(a, 0.5) for a in self.grid.axes[:-1]]
             for sweep, (a, part) in enumerate((*halves, (self.grid.dim - 1, 1.0), *reversed(halves))):
                 if sweep:
-                    self.edges.fill_scalar(now, rule)
+                    self._fill(now, rule)
                 out = self._copies[sweep % 2]
                 self._kernel(out, now, u[a], *rows, self.grid.strides[a], part * dt / (2 * self.grid.h))
                 now = out
             return now
         for stage, (a, b) in enumerate(self.stages):
             if stage:
-                self.edges.fill_scalar(now, rule)
+                self._fill(now, rule)
             self._k[:3] = a, b, b * dt / (2 * self.grid.h)
             out = self._copies[stage % 2]
             self._stage(out, q, now, self._ahead_of(u, now, *rows), *rows)

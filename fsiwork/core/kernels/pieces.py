@@ -18,6 +18,12 @@ def steepness(steep, q, start, n, s, size):
     for r in prange(start.size):
         I, m, x, y, z = start[r] - 2, n + 4, s[0], s[1], s[2]
         o, east, north, up = q[I : I + m], q[I + x : I + x + m], q[I + y : I + y + m], q[I + z : I + z + m]
+        here, change = o[0], o[0] - o[0]  # most rows are flat
+        for i in range(m):
+            change += abs(o[i] - here) + abs(east[i] - here) + abs(north[i] - here) + abs(up[i] - here)
+        if change == 0:
+            steep[r] = 0
+            continue
         d = np.empty(m, q.dtype)  # first without reductions, so that it vectorises
         for i in range(m):
             d[i] = max(abs(east[i] - o[i]), max(abs(north[i] - o[i]), abs(up[i] - o[i])))
