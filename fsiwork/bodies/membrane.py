@@ -14,7 +14,6 @@ from fsiwork.bodies.pull import Pull
 from fsiwork.core.edges import Edges
 from fsiwork.core.grid import Grid
 from fsiwork.core.integrals import length_and_area
-from fsiwork.core.integrals import length_and_area
 from fsiwork.core.kernels import interface as kernels
 from fsiwork.core.poisson import Direct
 from fsiwork.core.transport import Transport
@@ -181,8 +180,6 @@ class Membrane(Body):
         for a in self.grid.axes:
             out[f"centroid_{XYZ[a]}"] = centre[a]
             out[f"axis_{XYZ[a]}"] = self._inside.half_extent(self.phi, centre, a) if volume > 0.0 else 0.0
-        if self.grid.dim == 2:
-            out["geometric_length"], out["geometric_volume"] = length_and_area(self.grid, self.phi)
         if self.grid.dim == 2:
             out["geometric_length"], out["geometric_volume"] = length_and_area(self.grid, self.phi)
         return out | {"stretch_min": float(values[kernels.LEAST]), "stretch_max": float(values[kernels.MOST])}
