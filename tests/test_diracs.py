@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from fsiwork.core.grid import Grid
-from fsiwork.core.integrals import area_and_volume, length_and_area
+from fsiwork.core.integrals import area_and_volume, length_and_area, line_integral, smeared
 from fsiwork.core.shapes import Ball, Torus
+from fsiwork.studies import diracs
 
 EIGHT = Grid((8, 8, 8), 0.125)
 CENTRE = (0.51, 0.487, 0.53)
@@ -108,3 +109,29 @@ def test_the_plane_is_refused():
     grid = Grid((8, 8), 0.125)
     with pytest.raises(ValueError, match="surfaces in space"):
         area_and_volume(grid, grid.field())
+
+
+@pytest.mark.parametrize("scaling", diracs.SCALINGS)
+@pytest.mark.parametrize("kind", diracs.KINDS)
+def test_the_smeared_ellipse_without_a_grid_is_what_sums_tend_to(kind, scaling):
+    found = diracs.widths(None, {"kind": kind, "scaling": scaling, "width": 24, "step": 1 / 96, "draws": 4})
+    assert found["error"] == pytest.approx(found["limit"], rel=0.05)
+    if scaling == "plain":  # L(c) = L √(1 + c): half the second moment of ζ times -1/4
+        moment = 1 / 3 - 2 / math.pi**2 if kind == "cosine" else 1 / 6
+        assert found["limit"] == pytest.approx(moment * 0.25**2 / 8, rel=0.05)
+
+
+@pytest.mark.parametrize("name", diracs.CURVES)
+def test_curves_in_space_are_of_second_order(name):
+    errors = [diracs.curves(None, {"curve": name, "kind": "cosine", "cells": n, "draws": 2})["error"] for n in (32, 64)]
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(2, abs=0.15)
+    assert errors[1] < 0.01
+
+
+def test_a_line_integral_wants_space_and_numbers():
+    flat = Grid((8, 8), 0.125)
+    with pytest.raises(ValueError, match="cut out of space"):
+        line_integral(flat, (flat.field(), flat.field()), 0.1)
+    assert line_integral(EIGHT, (np.ones(EIGHT.size), np.ones(EIGHT.size)), 0.1) == 0
+    assert math.isnan(line_integral(EIGHT, (np.full(EIGHT.size, math.nan), ball(0.3)), 0.1))
+    assert math.isnan(smeared(EIGHT, np.full(EIGHT.size, math.inf), 0.1))
