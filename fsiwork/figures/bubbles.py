@@ -9,7 +9,11 @@ from matplotlib.figure import Figure
 from fsiwork.figures import style
 from fsiwork.studies.histories import history
 
-CASES = {"kept": ("film breaks at 0.02, volume kept", "o", "-"), "alone": ("φ alone", "s", "--")}
+CASES = {
+    "kept": ("film breaks at 0.02", "o", "-"),
+    "semi_lagrangian": ("the same, semi-Lagrangian", "x", ":"),
+    "alone": ("φ alone", "s", "--"),
+}
 
 
 def fig_1_4(datasets: Mapping[str, xr.Dataset], measured: Mapping[str, float]) -> Figure:
@@ -28,9 +32,8 @@ def fig_1_4(datasets: Mapping[str, xr.Dataset], measured: Mapping[str, float]) -
     _times(axes[0, 2], measured, cells)
     _volumes(axes[1, 2], runs, tensions, cells)
     change = max(measured[f"merge_change_{word}_kept"] for word in ("free", "pulled"))
-    style.note(
-        figure, datasets, f"merging time, N = 128 to 256: {change:.1f} %; volume within {measured['volume_kept']:.3f} %"
-    )
+    kept = f"volume within {measured['volume_kept']:.3f} %, mean buoyancy {measured['content_kept']:.1f} %"
+    style.note(figure, datasets, f"merging time, N = 128 to 256: {change:.1f} %; {kept}")
     return figure
 
 

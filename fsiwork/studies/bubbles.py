@@ -12,15 +12,17 @@ from fsiwork.studies.histories import complete, history, spec
 def fig_1_4(datasets: Mapping[str, xr.Dataset]) -> dict[str, float]:
     """When the bubbles merge on each grid, and how well their volume is kept.
 
-    For every surface tension (``free``: none, ``pulled``) and case (``kept``: films of a given thickness break and φ is
-    shifted; ``alone``: φ as it is carried): ``merge_*_N`` is the time from which there is one piece, ``merge_change_*``
-    how much it differs between N = 128 and 256 in percent of the larger. For every case: ``volume_*`` is the largest
-    deviation of the volume of φ < 0 from that of the two discs, ``content_*`` that of the total buoyancy, percent.
-    ``pieces_first`` is the least, ``pieces_last`` the largest number of pieces at the first and the last moment.
+    Surface tension is ``free`` (none) or ``pulled``; the case is ``kept`` (films of a given thickness break and φ is
+    shifted), ``alone`` (φ as it is carried) or ``semi_lagrangian`` (as ``kept``, with the book's transport).
+    ``merge_TENSION_CASE_N`` is the time from which there is one piece, ``merge_change_TENSION_CASE`` what it differs
+    between N = 128 and 256 in percent of the larger. ``volume_CASE`` is the largest deviation of the volume of φ < 0
+    from that of the two discs, ``content_CASE`` that of the mean buoyancy inside from its first value, percent.
+    ``pieces_first`` is the least, ``pieces_last`` the largest number of pieces at the first and the last moment
+    (``kept``).
     """
     runs, out = datasets["bubbles"], {}
     first, last = [], []
-    for case in ("kept", "alone"):
+    for case in map(str, runs["case"].values):
         volumes, contents = [], []
         for word, tension in zip(("free", "pulled"), sorted(runs["tension"].values), strict=True):
             for n in (int(n) for n in sorted(runs["cells"].values)):
