@@ -64,5 +64,5 @@ def _errors(ax, data: xr.Dataset) -> None:
     ax.set_xticks(longest, [f"{q:g}" for q in longest])
     ax.set_xticks([], minor=True)
     ax.set_title("against DOP853, every marker, t ≤ 2")
-    ax.set_ylim(1e-12, None)
+    ax.set_ylim(3e-5 * float(data["position_error"].min()), None)
     ax.legend(fontsize=7, loc="lower right")
