@@ -151,12 +151,13 @@ def segment(
     image: Annotated[Path, typer.Argument(metavar="IMAGE", help="A picture (.png, .jpg, …), or an array (.npy).")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT.nc", help="The file to write.")],
     smoothing: Annotated[float, typer.Option(min=0.1, help="Radius [pixels] below which a spot is noise.")] = 2.5,
+    start: Annotated[str, typer.Option(help="around: one contour around all; levels: also finds holes.")] = "around",
 ) -> None:
-    """Part a picture or a volume of two levels by active contours, which start at its sides."""
+    """Part a picture or a volume of two levels by active contours."""
     with _in_one_line(ValueError):
         from fsiwork.segmenting import to_file
 
-        typer.echo(f"{output}: {to_file(image, output, smoothing)}")
+        typer.echo(f"{output}: {to_file(image, output, smoothing, start)}")
 
 
 @app.command()

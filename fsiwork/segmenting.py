@@ -50,7 +50,7 @@ def _picture(path: Path) -> np.ndarray:
         return np.asarray(grey, dtype=float)[::-1]
 
 
-def to_file(image: str | Path, path: str | Path, smoothing: float = 2.5) -> str:
+def to_file(image: str | Path, path: str | Path, smoothing: float = 2.5, start: str = "around") -> str:
     """Segment the picture or volume ``image`` and write ``NAME.nc``; returns one line about what was found.
 
     Raises ValueError, in one line, for a bad image or name, and what `fsiwork.netcdf.written` raises.
@@ -63,26 +63,27 @@ def to_file(image: str | Path, path: str | Path, smoothing: float = 2.5) -> str:
     from fsiwork.core.segmentation import segment
 
     try:
-        found = segment(q, smoothing)
+        found = segment(q, smoothing, start=start)
     except ValueError as error:
         raise ValueError(f"{image}: {error}") from error
-    with written(path, _attributes(image, found, smoothing), 3.0 * q.nbytes) as out:
+    with written(path, _attributes(image, found, smoothing, start), 3.0 * q.nbytes) as out:
         _fields(out, q, found)
         _energy(out, found)
     inside = int((found.phi < 0).sum())
     return f"{found.ended}, {inside} of {q.size} cells inside, levels {found.inside:.6g} and {found.outside:.6g}"
 
 
-def _attributes(image: str | Path, found: "Segmentation", smoothing: float) -> dict:
+def _attributes(image: str | Path, found: "Segmentation", smoothing: float, start: str) -> dict:
     installed = provenance.versions()
     return {
         "Conventions": CONVENTIONS,
         "title": f"Segmentation of {Path(image).name}",
         "source": f"fsiwork {installed['fsiwork']}",
-        "history": f"fsiwork segment {Path(image).name} --smoothing {smoothing:g}",
+        "history": f"fsiwork segment {Path(image).name} --smoothing {smoothing:g} --start {start}",
         "references": f"{BOOK}. Active contours (1.29), corrected",
         "image_sha256": hashlib.sha256(Path(image).read_bytes()).hexdigest(),
         "smoothing": smoothing,
+        "start": start,
         "level_inside": found.inside,
         "level_outside": found.outside,
         "steps": found.steps,

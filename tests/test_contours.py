@@ -115,6 +115,16 @@ def test_a_shape_at_the_side_is_kept():
     assert (segment(1 - image, smoothing=1.0).phi < 0)[5, 20]
 
 
+def test_holes_are_found_from_the_levels_only():
+    x, y = np.meshgrid(np.arange(48) - 23.5, np.arange(48) - 23.5, indexing="ij")
+    clean = (np.hypot(x, y) < 17) & (np.hypot(x, y) > 8)
+    image = 5 - 2 * clean + RNG.normal(0, 0.6, x.shape)  # dark
+    around, levels = (segment(image, start=start).phi < 0 for start in ("around", "levels"))
+    assert around[24, 24]
+    assert not levels[24, 24]
+    assert (levels == clean).mean() > 0.97
+
+
 @pytest.mark.parametrize("shape", [(8, 8), (8, 9, 8)])
 def test_the_smallest_images(shape):
     image = np.zeros(shape)
@@ -143,6 +153,8 @@ def test_what_cannot_be_parted_is_refused(image, words):
 def test_bad_numbers_are_refused(smoothing, eps):
     with pytest.raises(ValueError, match="positive"):
         segment(noisy((9, 9))[1], smoothing, eps)
+    with pytest.raises(ValueError, match="around, levels"):
+        segment(noisy((9, 9))[1], start="inside")
     with pytest.raises(ValueError, match="shape"):
         Contours(Grid((9, 9), 1.0), np.zeros((9, 8)), 1.0, 1.0)
 

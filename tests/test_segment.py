@@ -103,7 +103,10 @@ def test_a_bad_file_is_one_line_and_leaves_nothing(name, levels, tmp_path, capsy
     assert sorted(tmp_path.iterdir()) == before
 
 
-@pytest.mark.parametrize("arguments", [("-o", "out.txt"), ("-o", "."), ("-o", "out.nc", "--smoothing", "0")])
+@pytest.mark.parametrize(
+    "arguments",
+    [("-o", "out.txt"), ("-o", "."), ("-o", "out.nc", "--smoothing", "0"), ("-o", "out.nc", "--start", "x")],
+)
 def test_bad_options_are_one_line(arguments, levels, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     np.save("a.npy", levels)

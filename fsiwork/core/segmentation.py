@@ -9,6 +9,7 @@ from fsiwork.core.contours import Contours, State, Watch, descend
 from fsiwork.core.grid import Grid
 
 SMALLEST = 8  # cells in a direction
+STARTS = ("around", "levels")
 
 
 @dataclass(frozen=True)
@@ -29,18 +30,27 @@ class Segmentation:
 
 
 def segment(
-    image: np.ndarray, smoothing: float = 2.5, eps: float = 3.0, steps: int = 4000, watch: Watch | None = None
+    image: np.ndarray,
+    smoothing: float = 2.5,
+    eps: float = 3.0,
+    start: str = "around",
+    steps: int = 4000,
+    watch: Watch | None = None,
 ) -> Segmentation:
-    """Part an image of two levels, from a contour along its sides inwards; should it vanish, from a threshold.
+    """Part an image of two levels by (1.29), which moves contours and makes no new ones.
 
     Parameters
     ----------
     image : shape (x, y[, z]), at least 8 cells in each direction, finite, any units
     smoothing : radius [cells] below which a disc of full contrast is taken for noise
     eps : half-width of the contour [cells]
+    start : ``around``, a contour along the sides (holes stay closed; should it vanish, the other), or ``levels``, where
+        the smoothed image is halfway between its two levels
 
     Raises ValueError, in one line, when nothing can be parted.
     """
+    if start not in STARTS:
+        raise ValueError(f"start must be one of {', '.join(STARTS)}, got {start!r}")
     q = np.asarray(image, float)
     if q.ndim not in (2, 3) or min(q.shape) < SMALLEST:
         raise ValueError(f"at least {SMALLEST} cells in two or three directions, got {' × '.join(map(str, q.shape))}")
@@ -57,9 +67,11 @@ def segment(
         if watch:
             watch(step, state, new)
 
-    state, ended = descend(contours, surrounding(q.shape, eps), steps=steps, watch=keep)
-    if ended == "empty":  # both sides had the same level at first, and the length won
-        state, ended = descend(contours, threshold(smooth, 0.5 * (low + high)), steps=steps, watch=keep)
+    halfway = threshold(smooth, 0.5 * (low + high))
+    first = surrounding(q.shape, eps) if start == "around" else halfway
+    state, ended = descend(contours, first, steps=steps, watch=keep)
+    if ended == "empty" and start == "around":  # both sides had the same level at first, and the length won
+        state, ended = descend(contours, halfway, steps=steps, watch=keep)
     levels = (low + (high - low) * c for c in (state.outside, state.inside))
     count = len(fresh) - sum(fresh)
     return Segmentation(state.phi, *levels, np.array(energy), np.array(fresh), count, ended)
