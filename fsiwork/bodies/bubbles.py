@@ -163,7 +163,7 @@ class Bubbles(Membrane):
             self.phi += np.clip((self.volume() - self._volume) / surface, -0.5 * h, 0.5 * h)
 
     def _break_films(self):
-        """Where two pieces come nearer than ``film``, join them by a ball half as wide again."""
+        """Where two pieces come nearer than ``film``, join them by a ball half as wide again; not across the sides."""
         piece = self._pieces()
         if piece.max() <= piece[piece > 0].min(initial=piece.max()):
             return
