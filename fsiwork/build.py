@@ -81,7 +81,7 @@ def _bubbles(spec, grid: Grid, edges: Edges) -> Bubbles:
 
 
 def _transport(spec, grid: Grid, edges: Edges, centring: int) -> Transport:
-    return Transport(grid, edges, spec.scheme, spec.tableau, np.dtype(spec.dtype), centring)
+    return Transport(grid, edges, spec.scheme, spec.tableau, np.dtype(spec.dtype), centring, band=spec.band)
 
 
 def _interface(spec, grid: Grid, edges: Edges) -> Interface:

@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
+from fsiwork.build import parts
 from fsiwork.core import levelset, schemes1d
 from fsiwork.core.edges import Edges, Side
 from fsiwork.core.grid import Grid
 from fsiwork.core.pieces import Pieces
 from fsiwork.core.transport import SPLIT, Transport
+from fsiwork.scene import Scene
 
 ORDERS = {
     "centred": 1.9, "eno2": 1.8, "eno3": 2.7,
@@ -198,6 +200,27 @@ def test_pieces_are_where_the_field_is_not_flat():
                 there = np.moveaxis(grid.inside(marked), a, 0)
                 np.moveaxis(reached, a, 0)[...] = np.roll(there, k, 0)
                 assert grid.inside(around)[reached].all()
+
+
+def test_a_scene_may_ask_for_a_band_of_an_interface_only():
+    def scene(body):
+        box = {"length": [1.0, 1.0], "cells": 32, "edges": "walls"}
+        motion = {"kind": "vortex"}
+        shape = {"kind": "disc", "centre": [0.5, 0.7], "radius": 0.15}
+        clock, output = {"end": 0.1, "step": 0.01}, {"fields": ["phi"]}
+        return {"box": box, "motion": motion, "bodies": [body | {"shape": shape}], "clock": clock, "output": output}
+
+    body = {"kind": "interface", "transport": {"scheme": "eno3", "band": 6}}
+    found = parts(Scene.model_validate(scene(body)))[1][0].transport
+    assert (found.scheme, found._pieces.band) == ("eno3", 6.0)
+    for wrong in (
+        {"kind": "interface", "transport": {"band": 2}},
+        {"kind": "interface", "transport": {"band": 6, "carry": "map"}},
+        {"kind": "membrane", "energy": {"kind": "linear", "stiffness": 1.0}, "width": {"cells": 3}}
+        | {"transport": {"band": 6}},
+    ):
+        with pytest.raises(ValueError, match="band"):
+            Scene.model_validate(scene(wrong))
 
 
 def test_a_band_clips_only_what_is_high():

@@ -86,12 +86,24 @@ class Width(Spec):
 
 
 class Transport(Spec):
-    """How the interface is carried: φ itself (field) or the backward map Y with φ = φ₀(Y) (map)."""
+    """How the interface is carried: φ itself (field) or the backward map Y with φ = φ₀(Y) (map).
 
-    scheme: Literal["weno5", "weno-z", "upwind5", "upwind1", "semi-lagrangian"] = "weno5"
+    ``band``: only so many cells on either side of it; φ is clipped beyond.
+    """
+
+    scheme: Literal[
+        "weno5", "weno-z", "upwind5", "upwind1", "centred", "eno2", "eno3",
+        "lax-wendroff", "beam-warming", "fromm", "semi-lagrangian",
+    ] = "weno5"  # fmt: skip
+    band: Annotated[float, Field(ge=3)] | None = None
     tableau: Literal["ssp-rk3", "ssp-rk2", "euler"] = "ssp-rk3"
     carry: Literal["field", "map"] = "field"
     dtype: Literal["float64", "float32"] = "float64"
+
+    @sense
+    def _band_of_a_field(self) -> Iterator[Fault]:
+        if self.band and self.carry == "map":
+            yield ("band",), "is for carry: field; a map is needed everywhere"
 
 
 class Membrane(Spec):
@@ -116,6 +128,8 @@ class Membrane(Spec):
 
     @sense
     def _bending_fits(self) -> Iterator[Fault]:
+        if self.transport.band:
+            yield ("transport", "band"), "is for kind: interface; a membrane's |∇φ| is its stretch"
         if self.bending and self.coupling == "iterated":
             yield ("coupling",), "with bending it must be explicit, semi-implicit or stabilised, got 'iterated'"
         if self.bending and self.coupling == "stabilised" and (self.inside or self.surface_mass):
@@ -181,6 +195,8 @@ class Bubbles(Spec):
                 yield ("parts", k), "all bubbles have a density, or all a buoyancy"
         if self.boussinesq and self.viscosity is not None:
             yield ("viscosity",), "bubbles with a buoyancy have the viscosity of the fluid"
+        if self.transport.band:
+            yield ("transport", "band"), "is for kind: interface"
         for name in ("film", "keep_volume"):
             if getattr(self, name) and self.transport.carry == "map":
                 yield (name,), "needs transport.carry: field"
