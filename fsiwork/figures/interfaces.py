@@ -14,6 +14,9 @@ METHODS = {
     "redistanced": ("φ, redistanced", style.OKABE_ITO[2], "s"),
     "map": ("map Y, φ₀(Y)", style.OKABE_ITO[0], "^"),
 }
+LEAST = 1e-8
+PARTICLES = {"zalesak": {100: 0.31}, "reversed_vortex": {64: 1.81, 128: 0.71, 256: 0.35}, "enright": {100: 2.6}}
+"""Percent of area or volume that the particle level set loses (Enright et al. 2002, as recalled)."""
 EXACT = {"color": "0", "linewidth": 0.7, "linestyle": (0, (4, 2))}
 
 
@@ -70,25 +73,30 @@ def fig_1_6(datasets: Datasets, measured: Measured) -> Figure:
 
 
 def back_again(datasets: Datasets, measured: Measured) -> Figure:
-    """Outlines half way and at the end on the finest grid that all methods have, and errors over N."""
-    (data,) = datasets.values()
+    """Outlines half way and at the end on the second finest grid, with how they began; errors over N."""
+    ((study, data),) = datasets.items()
     cells = sorted(int(n) for n in data["cells"].values)
+    shown = cells[max(len(cells) - 2, 0)]
     figure, axes = style.sheet(2, 3, size=(9.4, 6.6))
-    for k, when in enumerate(("half", "end")):
+    for ax, when, word in zip(axes[:, 0], ("half", "end"), ("half way", "at the end"), strict=True):
         for method, (label, colour, _) in METHODS.items():
-            one = data.sel(carried=method, cells=cells[-1])
-            axes[k, 0].plot(one[f"{when}_x"], one[f"{when}_y"], color=colour, label=label, linewidth=1.1)
-        word = {"half": "half way", "end": "back"}[when]
-        axes[k, 0].set(aspect="equal", title=f"{word}, N = {cells[-1]}", xlabel="x [length]", ylabel="y [length]")
-    names = {"volume": "|change of volume| [%]", "mismatch": "on the wrong side [% of inside]"}
+            one = data.sel(carried=method, cells=shown)
+            ax.plot(one[f"{when}_x"], one[f"{when}_y"], color=colour, label=label, linewidth=1.1)
+        if when == "end":
+            ax.plot(one["start_x"], one["start_y"], label="exact, as it began", **EXACT)
+        ax.set(aspect="equal", title=f"{word}, N = {shown}", xlabel="x [length]", ylabel="y [length]")
+    names = {"volume": "|change of volume| [%]", "mismatch": "on the wrong side [% of the inside]"}
     names |= {"l1": "L1 [Δx]", "shape": "mean distance of the line [Δx]"}
     for ax, (name, label) in zip(axes[:, 1:].ravel(), names.items(), strict=True):
-        for method, (_, colour, marker) in METHODS.items():
+        for method, (word, colour, marker) in METHODS.items():
             values = np.abs(data[name].sel(carried=method).sel(cells=cells))
-            ax.plot(cells, values.where(values > 0), color=colour, marker=marker)
+            ax.plot(cells, np.maximum(values, LEAST), color=colour, marker=marker, label=word)
         ax.set(xscale="log", yscale="log", title=label, xlabel="N, cells along a side")
         ax.set_xticks(cells, [str(n) for n in cells])
         ax.set_xticks([], minor=True)
-    axes[0, 0].legend(loc="best", fontsize=7)
-    style.note(figure, datasets)
+    lost = PARTICLES.get(study, {})
+    axes[0, 1].plot(list(lost), list(lost.values()), "x", color="0", label="particle level set")
+    axes[0, 1].legend(loc="best", fontsize=7)
+    axes[1, 0].legend(loc="center", fontsize=7)
+    style.note(figure, datasets, f"nothing below {LEAST:g} is drawn lower")
     return figure

@@ -132,14 +132,14 @@ def returned(scene, point: dict[str, Any]) -> dict[str, Any]:
 
     ``volume`` (area in the plane): relative change [percent]. ``mismatch``: what lies on the wrong side, in percent of
     the inside; ``l1``: the same over the interface's own measure [Δx]. ``shape``: mean distance of its points from the
-    first interface [Δx]. ``map``: largest |Y - x| over the longest side of the box (NaN without a map). Outlines half
-    way and at the end (in space silhouettes along z) as ``half_x``, ``half_y``, ``end_x``, ``end_y``.
+    first interface [Δx]. ``map``: largest |Y - x| over the longest side of the box (NaN without a map). Outlines at
+    the start, half way and at the end (in space silhouettes along z) as ``start_x``, ``start_y``, ``half_x`` and so on.
     """
     sim = build(scene)
     body, g = sim.bodies[0], sim.flow.grid
     first, outlines = _look(body), {}
     for t in _moments(sim):
-        for name, share in (("half", 0.5), ("end", 1.0)):
+        for name, share in (("start", 0.0), ("half", 0.5), ("end", 1.0)):
             if abs(t - share * scene.clock.end) < 1e-9 * scene.clock.end:
                 outlines[name] = _silhouette(*body.finer(_factor(g)))
     fine, was, now = first[0], first[1], _look(body)[1]
