@@ -6,7 +6,7 @@ import math
 import pytest
 
 from benchmarks import __main__ as command
-from benchmarks import freefem, poisson, rows, stepping, workflow
+from benchmarks import freefem, poisson, rows, stepping, transport, workflow
 from benchmarks.timing import least, triad
 
 KEYS = {"benchmark", "measured", "unit", "against", "reference", "ratio", "mark", "pass", "bandwidth_share"}
@@ -63,6 +63,13 @@ def test_poisson_python_and_memory_give_rows():
     largest, total = map(well_formed, stepping.allocation(64))
     assert largest["measured"] <= total["measured"]
     assert largest["pass"] is True
+
+
+def test_transport_gives_rows():
+    for scheme, dim in (("weno5", 2), ("weno5", 3), ("upwind5", 2)):
+        assert well_formed(transport.rate("weno", scheme, 16, dim, ">= 1e-9", seconds=0.01))["pass"] is True
+    assert well_formed(transport.band(64, seconds=0.01))["mark"] == ">= 5"
+    assert well_formed(transport.threads((16, 24)))["note"].count("at ") == 2
 
 
 def test_watch_sees_a_block(monkeypatch):
@@ -148,6 +155,7 @@ def test_every_mark_of_the_suite_is_named(tmp_path):
     names = {"flow_2d", "flow_2d_implicit", "flow_3d", "membrane_2d", "poisson_2d", "stage_2d", "stage_3d"}
     assert set(command.suite(tmp_path)) == names | {
         "python_share", "allocation", "workflow_parse", "freefem", "cold_start", "fmm_full", "fmm_band", "fmm_3d",
+        "weno_2d", "weno_3d", "upwind5_2d", "threads", "band", "geometric_length",
     }  # fmt: skip
 
 
