@@ -57,7 +57,7 @@ def _curves(ax, data: xr.Dataset, steps: xr.Dataset) -> None:
     narrow = steps["error"].sortby("step")
     ax.plot(narrow["step"], narrow, color=COLOURS[3], marker="D", linestyle="-.", label="ellipse, hat, 1-norm, ε = Δx")
     _order(ax, (0.025, 0.1), 1.2e-3, 1.5)
-    _order(ax, (0.02, 0.06), 6e-3, 2)
+    _order(ax, (0.02, 0.05), 9e-3, 2)
     _ticks(ax, (0.0125, 0.025, 0.05, 0.1))
     ax.set_ylim(bottom=2e-5)
     ax.set(xlabel="Δx [length]", title="Length of curves: ε⁻²ζζ|∇φ¹ × ∇φ²|, and 1-norm")
@@ -87,7 +87,8 @@ def _ticks(ax, values) -> None:
 
 
 def _order(ax, ends: tuple[float, float], start: float, order: float) -> None:
-    """A reference of an order from its low end."""
+    """A reference of an order from its low end, named at the high one."""
     x = np.array(ends, float)
     ax.plot(x, start * (x / x[0]) ** order, **style.REFERENCE)
-    ax.text(x[0], 0.9 * start, f"  order {order:g}", fontsize=7.5, color="0.35", va="top")
+    end = 1.1 * start * (x[1] / x[0]) ** order
+    ax.text(x[1], end, f"order {order:g}", fontsize=7.5, color="0.35", ha="right", va="bottom")
