@@ -191,3 +191,11 @@ def test_a_nan_is_never_the_smaller_one():
     assert np.isnan(flow.largest(flow.u[0]))
     flow.grid.inside(flow.u[1])[3, 4] = -np.inf
     assert flow.largest(flow.u[1]) == np.inf
+
+
+def test_a_sampled_field_may_be_written():
+    """Also when the function gives the full shape itself."""
+    grid = Grid((6, 5), 0.2)
+    q = grid.sample(lambda x, y: x + y)
+    q += 1.0
+    assert q.reshape(grid.shape)[3, 3] == pytest.approx(1.0 + 0.1 + 0.1)

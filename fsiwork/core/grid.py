@@ -80,4 +80,4 @@ class Grid:
     def sample(self, function, face: int | None = None, dtype=np.float64) -> np.ndarray:
         """Flat field of ``function(x, y[, z])``, ghosts included, at centres or on the low faces of ``face``."""
         values = np.broadcast_to(function(*self.points(face)), self.shape)
-        return np.ascontiguousarray(values, dtype=dtype).ravel()
+        return np.array(values, dtype=dtype, order="C").ravel()

@@ -118,8 +118,8 @@ def carried(_scene, point: dict[str, Any]) -> dict[str, Any]:
     grid = Grid((cells,) * 3, 2 / cells, (-1.0,) * 3)
     edges = Edges(grid, ((Side("free-slip"),) * 2,) * 3)
     carry = Transport(grid, edges, "upwind5", "ssp-rk3")
-    u = [np.ascontiguousarray(grid.sample(lambda *x, a=a: case.u(*x)[a], face=a)) for a in grid.axes]
-    Y = [np.array(grid.sample(lambda *x, a=a: x[a])) for a in grid.axes]
+    u = [grid.sample(lambda *x, a=a: case.u(*x)[a], face=a) for a in grid.axes]
+    Y = [grid.sample(lambda *x, a=a: x[a]) for a in grid.axes]
     fastest = sum(float(np.abs(c).max()) for c in u)
     steps = math.ceil(TIMES[0] * fastest / (COURANT * grid.h))
     out: dict[str, Any] = {"n_cells": cells, "n_steps": steps * len(TIMES)}

@@ -97,7 +97,7 @@ def energy(_scene, point: dict[str, Any]) -> dict[str, Any]:
     bending = Bending(grid, 1.0, EPS * grid.h, True)
 
     def of(shape) -> float:
-        phi, band = np.array(grid.sample(shape.distance)), Band(grid, EPS * grid.h, True)
+        phi, band = grid.sample(shape.distance), Band(grid, EPS * grid.h, True)
         band.find(phi)
         return bending.energy(phi, band)
 
