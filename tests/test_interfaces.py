@@ -68,18 +68,18 @@ def test_a_blob_for_a_while_on_small_grids_and_its_pictures():
 
 def test_a_turned_slot_is_exact_with_a_map_and_a_flipped_sign_shows(monkeypatch):
     changes = {"clock__frames": 2, "clock__step": 0.5}
-    rows = {name: [interfaces.returned(scene("zalesak", 32, **changes, **case), {})] for name, case in CASES.items()}
-    found = interfaces.back_again({"zalesak": study(rows, (32,))})
+    rows = {name: interfaces.returned(scene("zalesak", 32, **changes, **case), {}) for name, case in CASES.items()}
+    datasets = {"zalesak": study({name: [row | {"cpu_seconds": 1.0}] for name, row in rows.items()}, (32,))}
+    found = interfaces.back_again(datasets)
     assert found["map_map_32"] < 2e-8  # third order in time: 16 times the error of Δt = .25
     assert found["mismatch_map_32"] == 0.0
     assert 1.0 < found["mismatch_plain_32"] < 100.0
     assert found["volume_redistanced_32"] < 25.0
     assert "map_plain_32" not in found
-    data = {"zalesak": study(rows, (32,)).assign(cpu_seconds=1.0, n_steps=2.0, n_cells=32.0)}
-    header, table = interfaces.rows_back({"zalesak": data["zalesak"].broadcast_like(data["zalesak"]["volume"])}, {})
+    header, table = interfaces.rows_back(datasets, found)
     assert len(header) == len(table[0])
     assert len(table) == 3
-    assert len(figures.back_again(data, found).axes) == 6
+    assert len(figures.back_again(datasets, found).axes) == 6
 
     from fsiwork.core import motion
 

@@ -83,7 +83,7 @@ def back_again(datasets: Datasets, measured: Measured) -> Figure:
             one = data.sel(carried=method, cells=shown)
             ax.plot(one[f"{when}_x"], one[f"{when}_y"], color=colour, label=label, linewidth=1.1)
         if when == "end":
-            ax.plot(one["start_x"], one["start_y"], label="exact, as it began", **EXACT)
+            ax.plot(one["start_x"], one["start_y"], **EXACT)
         ax.set(aspect="equal", title=f"{word}, N = {shown}", xlabel="x [length]", ylabel="y [length]")
     names = {"volume": "|change of volume| [%]", "mismatch": "on the wrong side [% of the inside]"}
     names |= {"l1": "L1 [Δx]", "shape": "mean distance of the line [Δx]"}
@@ -97,6 +97,5 @@ def back_again(datasets: Datasets, measured: Measured) -> Figure:
     lost = PARTICLES.get(study, {})
     axes[0, 1].plot(list(lost), list(lost.values()), "x", color="0", label="particle level set")
     axes[0, 1].legend(loc="best", fontsize=7)
-    axes[1, 0].legend(loc="center", fontsize=7)
-    style.note(figure, datasets, f"nothing below {LEAST:g} is drawn lower")
+    style.note(figure, datasets, f"dashed: as it began; nothing below {LEAST:g} is drawn lower")
     return figure

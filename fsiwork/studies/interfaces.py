@@ -128,7 +128,8 @@ def fig_1_6(datasets: Mapping[str, xr.Dataset]) -> dict[str, float]:
 
 # ----------------------------------------------------------------------------------------------- there and back again
 def returned(scene, point: dict[str, Any]) -> dict[str, Any]:
-    """An interface that the motion brings back to where it was, against how it began.
+    """An interface that the motion brings back to where it was, against how it began; the scene has an even number of
+    frames.
 
     ``volume`` (area in the plane): relative change [percent]. ``mismatch``: what lies on the wrong side, in percent of
     the inside; ``l1``: the same over the interface's own measure [Δx]. ``shape``: mean distance of its points from the
@@ -138,9 +139,9 @@ def returned(scene, point: dict[str, Any]) -> dict[str, Any]:
     sim = build(scene)
     body, g = sim.bodies[0], sim.flow.grid
     first, outlines = _look(body), {}
-    for t in _moments(sim):
+    for _ in _moments(sim):
         for name, share in (("start", 0.0), ("half", 0.5), ("end", 1.0)):
-            if abs(t - share * scene.clock.end) < 1e-9 * scene.clock.end:
+            if sim.frame_number == share * scene.clock.frames:
                 outlines[name] = _silhouette(*body.finer(_factor(g)))
     fine, was, now = first[0], first[1], _look(body)[1]
     before, after = measures(fine, was), measures(fine, now)
