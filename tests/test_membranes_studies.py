@@ -30,7 +30,8 @@ def run(made, t=T, ended="complete", rest=R, low=0.55, **changes):
     """A run as a dataset without axes: axes that swing and settle at ``rest``, first minimum at ``low``."""
     bend = (0.75 - rest) * np.exp(-1.6 * t) * np.cos(np.pi * t / 0.8)
     bend[t > 0.3] *= (low - rest) / bend[t > 0.3].min()
-    gauges = {"axis_x": rest + bend, "axis_y": rest - bend, "volume": 1.178 * np.ones_like(t), "dt": 0.01 + 0 * t}
+    gauges = {"axis_x": rest + bend, "axis_y": rest - bend, "dt": 0.01 + 0 * t}
+    gauges |= {"geometric_volume": 1.178 * np.ones_like(t)}
     gauges |= {"kinetic_energy": 1e-3 * np.sin(t) ** 2, "length": 3.9 - 1e-3 * t} | changes
     out = xr.Dataset({k: ("row", v) for k, v in gauges.items()}, coords={"t_step": ("row", t)})
     return out.assign(ended=ended, scene=made, cpu_seconds=1.0, n_steps=400.0, n_cells=64.0)
@@ -106,7 +107,7 @@ def test_fig_3_9_tells_the_schemes_apart():
 def fig_3_10(loss=0.01, low=0.55, ended="complete"):
     """Four grids, the second of which loses ``loss`` percent, the finest with another first minimum."""
     losses, lows = {32: 0.4, 64: loss, 128: 0.005, 256: 0.003}, {256: low}
-    runs = {(n,): run(DROP, volume=1.178 * (1 - 0.01 * q * T / 4), low=lows.get(n, 0.55)) for n, q in losses.items()}
+    runs = {(n,): run(DROP, geometric_volume=1.178 * (1 - 0.01 * q * T / 4), low=lows.get(n, 0.55)) for n, q in losses.items()}
     runs[64,] = runs[64,].assign(ended=ended)
     return {"drop_refinement": stack(runs, "cells")}
 

@@ -73,7 +73,7 @@ def fig_3_10(datasets: Datasets, measured: Measured) -> Figure:
     left.set(xlabel=TIME, ylabel=AXES, ylim=(0.48, 0.86), title="Axes on the two finest grids")
     left.legend(loc="upper right", ncols=2)
     for n, colour in zip(cells, style.shades(len(cells)), strict=True):
-        t, volume = history(runs, "volume", cells=n)
+        t, volume = history(runs, "geometric_volume", cells=n)
         deviation = 100 * np.abs(volume / volume[0] - 1)
         step = max(1, t.size // 400)
         right.plot(t[1::step], np.maximum(deviation[1::step], 1e-6), color=colour, linewidth=1.1)

@@ -34,5 +34,5 @@ def lagrangian_twin(datasets: Mapping[str, xr.Dataset], measured: Mapping[str, f
         above.set(title=f"{law}, N = {cells[-1]}", xlabel="time t [T]", ylabel="half-axis along x [L]")
         below.set(xlabel="1/N [1]; 0: extrapolated", ylabel="time of the first minimum [T]", xlim=(0, None))
     panels[0, 0].legend()
-    style.note(figure, datasets, "ε = 3 Δx, plain D; markers Δx/2 apart, cosine δ of half-width 2 Δx; μ = 0.01, walls")
+    style.note(figure, datasets, "ε = 4 Δx; markers Δx/2 apart, cosine δ of half-width 2 Δx; μ = 0.01, walls")
     return figure

@@ -14,12 +14,8 @@ CARRIERS, LAWS = ("markers", "phi", "map"), ("drop", "membrane")
 
 
 def limit(values: list[float]) -> float:
-    """Value that the last three of a sequence tend to when their differences fall by a constant ratio (Aitken); NaN
-    when they do not fall."""
-    if len(values) < 3:
-        return math.nan
-    first, second = values[-2] - values[-3], values[-1] - values[-2]
-    return values[-1] + second**2 / (first - second) if abs(second) < abs(first) else math.nan
+    """Value at Δx = 0 from the two finest of grids that double, both methods being of first order; NaN for one grid."""
+    return 2 * values[-1] - values[-2] if len(values) > 1 else math.nan
 
 
 def turns(data: xr.Dataset, carrier: str, law: str) -> dict[int, tuple[float, float]]:
