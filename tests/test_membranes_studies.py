@@ -107,7 +107,8 @@ def test_fig_3_9_tells_the_schemes_apart():
 def fig_3_10(loss=0.01, low=0.55, ended="complete"):
     """Four grids, the second of which loses ``loss`` percent, the finest with another first minimum."""
     losses, lows = {32: 0.4, 64: loss, 128: 0.005, 256: 0.003}, {256: low}
-    runs = {(n,): run(DROP, geometric_volume=1.178 * (1 - 0.01 * q * T / 4), low=lows.get(n, 0.55)) for n, q in losses.items()}
+    volumes = {n: 1.178 * (1 - 0.01 * loss * T / 4) for n, loss in losses.items()}
+    runs = {(n,): run(DROP, geometric_volume=q, low=lows.get(n, 0.55)) for n, q in volumes.items()}
     runs[64,] = runs[64,].assign(ended=ended)
     return {"drop_refinement": stack(runs, "cells")}
 

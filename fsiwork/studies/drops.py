@@ -31,7 +31,7 @@ def fig_3_9(datasets: Mapping[str, xr.Dataset]) -> dict[str, float]:
 
 
 def volume_deviation(data: xr.Dataset, **point) -> float:
-    """Largest deviation of the geometric volume from its first value over a run, percent; NaN if the run ended badly."""
+    """Largest deviation of the geometric volume from its first value, in percent; NaN if the run ended badly."""
     volume = history(data, "geometric_volume", **point)[1]
     return 100 * float(np.abs(volume / volume[0] - 1).max()) if complete(data, **point) else np.nan
 
