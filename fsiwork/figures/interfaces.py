@@ -32,12 +32,12 @@ def fig_1_5(datasets: Datasets, measured: Measured) -> Figure:
             ax.plot(exact["x"], exact["y"], label="exact", **EXACT)
             area, length = ((measured[f"{q}_{method}_{n}"]) for q in ("area", "length"))
             sign = "" if method == "map" else "+"
-            ax.set_title(f"{label}, N = {n}\narea {area:{sign}.2g} %, length {length:{sign}.2g} %")
+            ax.set_title(f"{label}, N = {n}\narea {area:{sign}.3g} %, length {length:{sign}.3g} %")
             ax.set(aspect="equal", xlim=(0, 1), ylim=(0, 1))
         row[0].set_ylabel("y [length]")
     for ax in axes[-1]:
         ax.set_xlabel("x [length]")
-    axes[0, 0].legend(loc="center")
+    axes[0, 0].legend(loc="lower right")
     style.note(figure, datasets, "t = 5; dashed: markers; errors of area and length (map: absolute)")
     return figure
 
