@@ -72,7 +72,7 @@ def test_check_names_every_fault_in_a_line_and_ends_with_2(capsys, small):
     code, out, err = call(capsys, "check", small, *sets)
     assert (code, out) == (2, "")
     assert sorted(err) == [
-        "a: unknown key; known: box, fluid, bodies, clock, output",
+        "a: unknown key; known: box, fluid, motion, bodies, clock, output",
         "bodies.0.width: give either cells or length, got neither",
         "clock.frames: must be at least 1, got 0",
         "fluid.density: must be positive, got -1",
