@@ -7,6 +7,7 @@ import numpy as np
 from fsiwork.bodies import laws
 from fsiwork.bodies.body import Body
 from fsiwork.bodies.bubbles import Bubbles
+from fsiwork.bodies.curve import Curve, ring
 from fsiwork.bodies.interface import Interface
 from fsiwork.bodies.markers import Markers, outline
 from fsiwork.bodies.membrane import Membrane
@@ -98,9 +99,25 @@ def _interface(spec, grid: Grid, edges: Edges) -> Interface:
 
 
 def _markers(spec, grid: Grid, edges: Edges) -> Markers:
-    bounds = spec.shape.bounds(grid.dim)
-    points = outline(shape(spec.shape).distance, bounds, spec.spacing * grid.h)
+    if spec.shape.kind == "ring":
+        points = np.array(spec.shape.points(spec.spacing * grid.h))
+    else:
+        bounds = spec.shape.bounds(grid.dim)
+        points = outline(shape(spec.shape).distance, bounds, spec.spacing * grid.h)
     return Markers(grid, edges, points, _law(spec.energy), spec.stretch)
+
+
+def _curve(spec, grid: Grid, edges: Edges) -> Curve:
+    return Curve(
+        grid,
+        edges,
+        ring(spec.shape.centre, spec.shape.radius, "xyz".index(spec.shape.normal), spec.stretch),
+        _law(spec.energy),
+        spec.width.of(grid.h),
+        transport=_transport(spec.transport, grid, edges, 2),
+        carry=spec.transport.carry,
+        coupling=spec.coupling,
+    )
 
 
 def _law(spec) -> laws.Law:
@@ -108,7 +125,7 @@ def _law(spec) -> laws.Law:
     return LAWS[kind](spec.stiffness) if kind in LAWS else spec
 
 
-BODIES = {"membrane": _membrane, "bubbles": _bubbles, "interface": _interface, "markers": _markers}
+BODIES = {"membrane": _membrane, "bubbles": _bubbles, "interface": _interface, "markers": _markers, "curve": _curve}
 LAWS = {"quadratic": laws.Quadratic, "linear": laws.Linear}
 SHAPES = {
     "ball": shapes.Ball,

@@ -6,7 +6,7 @@ Arithmetic on the scene alone: nothing of the solver is loaded.
 import math
 from dataclasses import dataclass
 
-from fsiwork.scene import Body, Markers, Membrane, Scene, SceneError
+from fsiwork.scene import Body, Curve, Markers, Membrane, Scene, SceneError
 
 GHOSTS = 3  # as in core.grid, which this module does not load
 SHARE = 0.8  # of the available memory
@@ -127,7 +127,9 @@ def _variable(scene: Scene) -> bool:
 
 
 def _carried(body: Body, dim: int) -> int:
-    return 0 if isinstance(body, Markers) else 1 + dim * (body.transport.carry == "map")
+    if isinstance(body, Markers):
+        return 0
+    return (2 if isinstance(body, Curve) else 1) + dim * (body.transport.carry == "map")
 
 
 def _fields(scene: Scene) -> list[tuple[str, int]]:
@@ -208,9 +210,9 @@ def _stages(scene: Scene, solvers) -> list[tuple[str, float]]:
     for body in scene.bodies:
         if isinstance(body, Markers):
             continue
-        carry = _carried(body, scene.box.dim)
-        found.append(("transport of a field", float(carry - 1 or 1)))
-        if carry > 1:
+        mapped, fields = body.transport.carry == "map", 2 if isinstance(body, Curve) else 1
+        found.append(("transport of a field", float(scene.box.dim if mapped else fields)))
+        if mapped:
             found.append(("φ from the map", 1.0))
         if anew := getattr(body, "redistance", None):
             found.append(("distance anew", 1.0 / anew.every))
@@ -249,18 +251,19 @@ def _step(scene: Scene) -> float:
     if fluid and fluid.diffusion == "explicit" and fluid.viscosity > 0:
         limits.append(h**2 * fluid.density / (4 * scene.box.dim * fluid.viscosity))
     for body in scene.bodies:
-        tension = _tension(body) if isinstance(body, Membrane | Markers) else 0.0
+        tension = _tension(body) if isinstance(body, Membrane | Markers | Curve) else 0.0
         if tension > 0:
             inside = getattr(body, "inside", None)
             rho = min(fluid.density, inside.density) if inside else fluid.density
             mu = min(fluid.viscosity, inside.viscosity) if inside else fluid.viscosity
             eps = 2.0 * h if isinstance(body, Markers) else body.width.of(h)
+            tension /= 1.0 if isinstance(body, Membrane) else eps ** (scene.box.dim - 2)  # of a line in space
             limit = (mu * eps + math.hypot(mu * eps, math.sqrt(0.5 * tension * rho * eps) * h)) / tension
             limits.append(limit * (1.0 if getattr(body, "coupling", "explicit") == "explicit" else 4.0))
     return min(scene.clock.end, scene.clock.safety * min(limits))
 
 
-def _tension(body: Membrane | Markers) -> float:
+def _tension(body: Membrane | Markers | Curve) -> float:
     """s E'(s) and for a hardly stretched membrane its modulus, at the first stretch s."""
     s, law = body.stretch, body.energy
     kind = getattr(law, "kind", "")

@@ -16,6 +16,7 @@ from fsiwork.specs.bodies import (
     Body,
     Bubble,
     Bubbles,
+    Curve,
     Energy,
     Interface,
     Law,
@@ -30,6 +31,7 @@ from fsiwork.specs.bodies import (
 from fsiwork.specs.box import Box, Edges, FreeSlip, Inflow, NoSlip, Outflow, Periodic, Side, Wall
 from fsiwork.specs.faults import Fault, got, wording, wrong
 from fsiwork.specs.fluid import Fluid, Inside, Rest, Shear, TaylorGreen
+from fsiwork.specs.lines import Ring
 from fsiwork.specs.motion import Deformation, Motion, Rotation, Translation, Vortex
 from fsiwork.specs.shapes import (
     Ball,
@@ -49,10 +51,10 @@ from fsiwork.specs.shapes import (
 from fsiwork.specs.yaml import Loader
 
 __all__ = [
-    "Ball", "Block", "Body", "Box", "Bubble", "Bubbles", "Capsule", "Cassini", "Clock", "Deformation", "Edges",
-    "Ellipsoid", "Energy", "Fluid", "FreeSlip", "Inflow", "Inside", "Interface", "Intersection", "Law", "Linear",
-    "Markers", "Membrane", "Minus", "Motion", "Moved", "NoSlip", "Outflow", "Output", "Periodic", "Polygon",
-    "Quadratic", "Redistance", "Rest", "Rotation", "Scene", "SceneError", "Shape", "Shear", "Side", "Slot",
+    "Ball", "Block", "Body", "Box", "Bubble", "Bubbles", "Capsule", "Cassini", "Clock", "Curve", "Deformation",
+    "Edges", "Ellipsoid", "Energy", "Fluid", "FreeSlip", "Inflow", "Inside", "Interface", "Intersection", "Law",
+    "Linear", "Markers", "Membrane", "Minus", "Motion", "Moved", "NoSlip", "Outflow", "Output", "Periodic", "Polygon",
+    "Quadratic", "Redistance", "Rest", "Ring", "Rotation", "Scene", "SceneError", "Shape", "Shear", "Side", "Slot",
     "TaylorGreen", "Torus", "Translation", "Transport", "Union", "Vortex", "Wall", "Width", "faults", "load", "loads",
 ]  # fmt: skip
 
@@ -162,8 +164,8 @@ class Scene(Spec):
             yield ("bodies", i, "kind"), f"{body.kind} needs a fluid; with a motion go bodies of kind interface"
 
     def _shape_fits(self, i: int, body) -> Iterator[Fault]:
-        if isinstance(body, Markers) and self.box.dim != 2:
-            yield ("bodies", i, "kind"), f"markers are for two directions, the box has {self.box.dim}"
+        if isinstance(body, Markers) and self.box.dim != 2 and not isinstance(body.shape, Ring):
+            yield ("bodies", i, "shape", "kind"), f"in space markers make a ring, got {body.shape.kind}"
         for where, shape in _shapes(body):
             misfits = list(shape.misfits(self.box.dim))
             for path, text in misfits or _outside(shape, self.box):

@@ -78,7 +78,7 @@ def test_every_scene_runs_and_keeps_what_a_flow_keeps(name, carry):
         assert np.isfinite(values).all()
     for field, (_, q) in sim.fields(made.output.fields).items():
         assert np.isfinite(q).all(), field
-    if made.bodies:
+    if "volume" in gauges:  # not of curves in space
         bound = 1e-2 if name in ("zalesak", "enright") else 1e-3  # a slot of 1.6 cells, a ball of 5
         assert np.abs(gauges["volume"] / gauges["volume"][0] - 1).max() < bound
         maps = [body.map is not None for body in sim.bodies if hasattr(body, "map")]

@@ -68,15 +68,14 @@ class Markers(Body):
 
     # --- answers ----------------------------------------------------------------------------------------------
     def longest_step(self, flow) -> dict[str, float]:
-        """(1.54) without viscosity, for ε = 2 Δx, with the tension E'r and with the tangential modulus."""
+        """(1.54) without viscosity, for ε = 2 Δx, with the tension E'r and with the tangential modulus; in space with
+        the same over ε, the stress of a tube."""
         r = np.linalg.norm(self._chords(), axis=1) / self.rest
         A, B = self.law.dE(r) * r, self.law.ddE(r) * r**2
         tops = {"elastic (1.54)": A.max(), "elastic, tangential": modulus(A, B).max()}
         h = self.grid.h
-        return {
-            name: float(np.sqrt(0.5 * flow.density * EPS * h / top) * h) if top > 0.0 else np.inf
-            for name, top in tops.items()
-        }
+        heavy = 0.5 * flow.density * (EPS * h) ** (self.grid.dim - 1)
+        return {name: float(np.sqrt(heavy / top) * h) if top > 0.0 else np.inf for name, top in tops.items()}
 
     def state(self) -> dict[str, np.ndarray]:
         """Positions and rest lengths."""

@@ -9,7 +9,8 @@ from pydantic_core import core_schema
 from fsiwork.specs.base import NotNegative, Number, Positive, Spec, one_of, sense, whole
 from fsiwork.specs.faults import Fault, got, wrong
 from fsiwork.specs.fluid import Inside
-from fsiwork.specs.shapes import Shape
+from fsiwork.specs.lines import Ring
+from fsiwork.specs.shapes import SHAPES, Shape
 
 
 class Quadratic(Spec):
@@ -119,7 +120,7 @@ class Membrane(Spec):
     energy: Energy
     width: Width
     coupling: Literal["explicit", "semi-implicit", "stabilised", "iterated"] = "semi-implicit"
-    form: Literal["auto", "normal-tangential", "divergence", "split"] = "auto"
+    form: Literal["auto", "normal-tangential", "divergence", "split", "korteweg"] = "auto"
     dirac: Literal["auto", "plain", "renormalised"] = "auto"
     inside: Inside | None = None
     surface_mass: NotNegative = 0.0
@@ -235,16 +236,37 @@ class Interface(Spec):
 
 
 class Markers(Spec):
-    """The same elastic line by Lagrangian markers: the immersed boundary method (3.1)-(3.8), in the plane.
+    """The same elastic line by Lagrangian markers: the immersed boundary method (3.1)-(3.8), in the plane or a ring.
 
-    The shape must be star-shaped seen from the middle of its bounds; the markers lie ``spacing`` cells apart at first.
+    A shape in the plane must be star-shaped seen from the middle of its bounds; the markers lie ``spacing`` cells apart
+    at first.
     """
 
     kind: Literal["markers"] = "markers"
-    shape: Shape
+    shape: one_of(*SHAPES, Ring)
     stretch: Positive = 1.0
     energy: Energy
     spacing: Positive = 0.5
 
 
-Body = one_of(Membrane, Bubbles, Interface, Markers)
+class Curve(Spec):
+    """An elastic curve in space (3.4), where two level sets meet; ``energy`` is per rest length, its slope a force.
+
+    ``stretch`` is |∇φ¹ × ∇φ²| at first, shared by both fields: the tube around the curve is 2ε/√stretch wide.
+    """
+
+    kind: Literal["curve"] = "curve"
+    shape: one_of(Ring)
+    stretch: Positive = 1.0
+    energy: Energy
+    width: Width
+    coupling: Literal["explicit", "stabilised"] = "explicit"
+    transport: Transport = Transport()
+
+    @sense
+    def _whole_field(self) -> Iterator[Fault]:
+        if self.transport.band:
+            yield ("transport", "band"), "is for kind: interface; |∇φ¹ × ∇φ²| is the stretch of a curve"
+
+
+Body = one_of(Membrane, Bubbles, Interface, Markers, Curve)

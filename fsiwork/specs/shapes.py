@@ -254,6 +254,7 @@ class Moved(_Shape):
         return tuple(v[i] * cos + cross[i] * sin + k[i] * along for i in range(len(d)))
 
 
-Shape = one_of(Ball, Ellipsoid, Block, Polygon, Capsule, Torus, Cassini, Slot, Union, Intersection, Minus, Moved)
+SHAPES = (Ball, Ellipsoid, Block, Polygon, Capsule, Torus, Cassini, Slot, Union, Intersection, Minus, Moved)
+Shape = one_of(*SHAPES)
 for _cls in (Union, Intersection, Minus, Moved):
     _cls.model_rebuild()
