@@ -1,6 +1,7 @@
 """Where a number comes from: hashes of scenes and sources, versions, the cost of a run (standard library only)."""
 
 import ast
+import atexit
 import ctypes
 import hashlib
 import json
@@ -55,8 +56,8 @@ def source_hash(*layers: str) -> str:
             raise FileNotFoundError(f"no layer {module!r} in fsiwork")
         for file in files:
             stamp = file.stat()
-            text = _bare(str(file), function, stamp.st_mtime_ns, stamp.st_size)
-            digest.update(f"{file.relative_to(PACKAGE).as_posix()}\n{text}\n".encode())
+            code = _bare(str(file), function, stamp.st_mtime_ns, stamp.st_size)
+            digest.update(f"{file.relative_to(PACKAGE).as_posix()}\n{code}\n".encode())
     if "core" in layers:
         digest.update(json.dumps(versions(NUMERICS)).encode())
     return digest.hexdigest()[:16]
@@ -72,10 +73,47 @@ def _files(layer: str) -> list[Path]:
 
 @cache
 def _bare(file: str, function: str, mtime: int, size: int) -> str:
-    """Code of a file, or of one function and what it names in the file, without comments and docstrings."""
-    tree = _tree(file, mtime, size)
-    body = _reached(tree.body, function) if function else tree.body
-    return ast.dump(ast.Module(body, tree.type_ignores))
+    """Hash of a file, or of one function and what it names in the file, without comments and docstrings.
+
+    Kept on disk by the file's time and size: parsing all sources takes longer than all the rest of a dry run.
+    """
+    key = f"{file}:{function}:{mtime}:{size}"
+    if key not in _kept():
+        tree = _tree(file, mtime, size)
+        body = _reached(tree.body, function) if function else tree.body
+        _kept()[key] = hashlib.sha256(ast.dump(ast.Module(body, tree.type_ignores)).encode()).hexdigest()
+    return _kept()[key]
+
+
+@cache
+def _kept() -> dict[str, str]:
+    """Hashes of earlier processes; what is new is written when this one ends, as far as the disk lets it."""
+    path = cache_root() / f"sources-{platform.python_version()}.json"
+    known: dict[str, str] = {}
+    with suppress(OSError, ValueError, TypeError):
+        known.update(json.loads(path.read_text(encoding="utf-8")))
+    before = len(known)
+
+    def keep():
+        if len(known) == before:
+            return
+        alive = {key: value for key, value in known.items() if _as_it_is(key)}
+        with suppress(OSError):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            spare = path.with_suffix(f".{os.getpid()}")
+            spare.write_text(json.dumps(alive), encoding="utf-8")
+            spare.replace(path)
+
+    atexit.register(keep)
+    return known
+
+
+def _as_it_is(key: str) -> bool:
+    file, _, mtime, size = key.rsplit(":", 3)
+    with suppress(OSError):
+        stamp = os.stat(file)
+        return (str(stamp.st_mtime_ns), str(stamp.st_size)) == (mtime, size)
+    return False
 
 
 @cache

@@ -3,6 +3,7 @@
 import ast
 import json
 import os
+import platform
 import signal
 import subprocess
 import sys
@@ -111,6 +112,37 @@ def test_light_import():
     look = "sorted({'numpy', 'numba', 'xarray'} & set(sys.modules))"
     code = f"import sys, fsiwork.provenance as p; p.source_hash(); print({look})"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+
+
+@pytest.mark.parametrize("damage", ["", "[1, 2]", "{", None])
+def test_hashes_kept_on_disk_are_those_of_the_sources(tmp_path, damage):
+    """Whatever lies there; and a later process writes what it had to parse."""
+    package = tmp_path / "package"
+    for name in ("scene.py", "specs/base.py"):
+        (package / name).parent.mkdir(parents=True, exist_ok=True)
+        (package / name).write_text(SMALL[name])
+    code = f"""
+        from pathlib import Path
+        from fsiwork import provenance
+        provenance.PACKAGE = Path({str(package)!r})
+        print(provenance.source_hash("scene"))
+        """
+    kept = package.parent / ".cache" / f"sources-{platform.python_version()}.json"
+    (package.parent / "pyproject.toml").touch()
+    if damage is not None:
+        kept.parent.mkdir(exist_ok=True)
+        kept.write_text(damage)
+
+    def run():
+        words = [sys.executable, "-c", textwrap.dedent(code)]
+        return subprocess.run(words, capture_output=True, text=True, check=True).stdout
+
+    first = run()
+    assert len(json.loads(kept.read_text())) == 2
+    assert run() == first
+    (package / "scene.py").write_text("x = 2\n")
+    assert run() != first
+    assert len(json.loads(kept.read_text())) == 2
 
 
 def test_prepare_sets_threads_and_an_own_cache():

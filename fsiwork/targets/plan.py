@@ -133,7 +133,7 @@ class Plan:
     def code_of(self, w: Any, study: str | None = None) -> str:
         """Hash of the sources a job depends on."""
         found = self.study(study or w.study, w.size)
-        solver = source_hash() if found.scene else source_hash("core.kernels")
+        solver = source_hash() if found.scene else source_hash("core", "bodies")
         return f"{solver}-{sources(found.call, 'studies')}" if found.call else solver
 
     def jobs_of(self, w: Any) -> list[str]:
