@@ -11,6 +11,7 @@ from fsiwork.bodies.curve import Curve, ring
 from fsiwork.bodies.interface import Interface
 from fsiwork.bodies.markers import Markers, outline
 from fsiwork.bodies.membrane import Membrane
+from fsiwork.bodies.shear import ShearMembrane
 from fsiwork.core import motion, shapes
 from fsiwork.core.edges import Edges, Side
 from fsiwork.core.flow import Flow
@@ -120,12 +121,34 @@ def _curve(spec, grid: Grid, edges: Edges) -> Curve:
     )
 
 
+def _shear_membrane(spec, grid: Grid, edges: Edges) -> ShearMembrane:
+    return ShearMembrane(
+        grid,
+        edges,
+        spec.shape.centre,
+        spec.shape.radius,
+        spec.law,
+        spec.area,
+        spec.shear,
+        spec.width.of(grid.h),
+        twist=spec.twist,
+        inflation=spec.inflation,
+    )
+
+
 def _law(spec) -> laws.Law:
     kind = getattr(spec, "kind", None)  # a law written in Python is the object itself
     return LAWS[kind](spec.stiffness) if kind in LAWS else spec
 
 
-BODIES = {"membrane": _membrane, "bubbles": _bubbles, "interface": _interface, "markers": _markers, "curve": _curve}
+BODIES = {
+    "membrane": _membrane,
+    "bubbles": _bubbles,
+    "interface": _interface,
+    "markers": _markers,
+    "curve": _curve,
+    "shear-membrane": _shear_membrane,
+}
 LAWS = {"quadratic": laws.Quadratic, "linear": laws.Linear}
 SHAPES = {
     "ball": shapes.Ball,

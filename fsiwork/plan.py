@@ -6,7 +6,7 @@ Arithmetic on the scene alone: nothing of the solver is loaded.
 import math
 from dataclasses import dataclass
 
-from fsiwork.scene import Body, Curve, Markers, Membrane, Scene, SceneError
+from fsiwork.scene import Body, Curve, Markers, Membrane, Scene, SceneError, ShearMembrane
 
 GHOSTS = 3  # as in core.grid, which this module does not load
 SHARE = 0.8  # of the available memory
@@ -251,20 +251,23 @@ def _step(scene: Scene) -> float:
     if fluid and fluid.diffusion == "explicit" and fluid.viscosity > 0:
         limits.append(h**2 * fluid.density / (4 * scene.box.dim * fluid.viscosity))
     for body in scene.bodies:
-        tension = _tension(body) if isinstance(body, Membrane | Markers | Curve) else 0.0
+        tension = _tension(body) if isinstance(body, Membrane | Markers | Curve | ShearMembrane) else 0.0
         if tension > 0:
             inside = getattr(body, "inside", None)
             rho = min(fluid.density, inside.density) if inside else fluid.density
             mu = min(fluid.viscosity, inside.viscosity) if inside else fluid.viscosity
             eps = 2.0 * h if isinstance(body, Markers) else body.width.of(h)
-            tension /= 1.0 if isinstance(body, Membrane) else eps ** (scene.box.dim - 2)  # of a line in space
+            if isinstance(body, Markers | Curve):
+                tension /= eps ** (scene.box.dim - 2)  # of a line in space
             limit = (mu * eps + math.hypot(mu * eps, math.sqrt(0.5 * tension * rho * eps) * h)) / tension
             limits.append(limit * (1.0 if getattr(body, "coupling", "explicit") == "explicit" else 4.0))
     return min(scene.clock.end, scene.clock.safety * min(limits))
 
 
-def _tension(body: Membrane | Markers | Curve) -> float:
-    """s E'(s) and for a hardly stretched membrane its modulus, at the first stretch s."""
+def _tension(body: Membrane | Markers | Curve | ShearMembrane) -> float:
+    """s E'(s) and for a hardly stretched membrane its modulus, at the first stretch s; with shear, both moduli."""
+    if isinstance(body, ShearMembrane):
+        return body.area + body.shear
     s, law = body.stretch, body.energy
     kind = getattr(law, "kind", "")
     if kind == "linear":

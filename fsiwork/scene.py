@@ -25,6 +25,7 @@ from fsiwork.specs.bodies import (
     Membrane,
     Quadratic,
     Redistance,
+    ShearMembrane,
     Transport,
     Width,
 )
@@ -54,8 +55,9 @@ __all__ = [
     "Ball", "Block", "Body", "Box", "Bubble", "Bubbles", "Capsule", "Cassini", "Clock", "Curve", "Deformation",
     "Edges", "Ellipsoid", "Energy", "Fluid", "FreeSlip", "Inflow", "Inside", "Interface", "Intersection", "Law",
     "Linear", "Markers", "Membrane", "Minus", "Motion", "Moved", "NoSlip", "Outflow", "Output", "Periodic", "Polygon",
-    "Quadratic", "Redistance", "Rest", "Ring", "Rotation", "Scene", "SceneError", "Shape", "Shear", "Side", "Slot",
-    "TaylorGreen", "Torus", "Translation", "Transport", "Union", "Vortex", "Wall", "Width", "faults", "load", "loads",
+    "Quadratic", "Redistance", "Rest", "Ring", "Rotation", "Scene", "SceneError", "Shape", "Shear", "ShearMembrane",
+    "Side", "Slot", "TaylorGreen", "Torus", "Translation", "Transport", "Union", "Vortex", "Wall", "Width", "faults",
+    "load", "loads",
 ]  # fmt: skip
 
 
@@ -166,6 +168,9 @@ class Scene(Spec):
     def _shape_fits(self, i: int, body) -> Iterator[Fault]:
         if isinstance(body, Markers) and self.box.dim != 2 and not isinstance(body.shape, Ring):
             yield ("bodies", i, "shape", "kind"), f"in space markers make a ring, got {body.shape.kind}"
+        if isinstance(body, ShearMembrane):
+            kinds = {side.kind for pair in self.box.sides for side in pair}
+            yield from ((("bodies", i, *path), text) for path, text in body.misfits(self.box.dim, kinds))
         for where, shape in _shapes(body):
             misfits = list(shape.misfits(self.box.dim))
             for path, text in misfits or _outside(shape, self.box):

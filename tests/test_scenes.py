@@ -35,7 +35,8 @@ def small(name, steps=10, **changes):
 def carried(name, how):
     """Overrides that let every body of a scene be carried by φ (``field``) or by Y (``map``)."""
     made = small(name)
-    found = {f"bodies__{i}__transport__carry": how for i, body in enumerate(made.bodies) if body.kind != "markers"}
+    fixed = ("markers", "shear-membrane")
+    found = {f"bodies__{i}__transport__carry": how for i, body in enumerate(made.bodies) if body.kind not in fixed}
     if how == "map":
         found |= {f"bodies__{i}__redistance": None for i, body in enumerate(made.bodies) if body.kind == "interface"}
         changed = {"film": 0.0, "keep_volume": False}  # what changes φ has no place in a map

@@ -10,7 +10,7 @@ from fsiwork.specs.base import NotNegative, Number, Positive, Spec, one_of, sens
 from fsiwork.specs.faults import Fault, got, wrong
 from fsiwork.specs.fluid import Inside
 from fsiwork.specs.lines import Ring
-from fsiwork.specs.shapes import SHAPES, Shape
+from fsiwork.specs.shapes import SHAPES, Ball, Shape
 
 
 class Quadratic(Spec):
@@ -269,4 +269,38 @@ class Curve(Spec):
             yield ("transport", "band"), "is for kind: interface; |∇φ¹ × ∇φ²| is the stretch of a curve"
 
 
-Body = one_of(Membrane, Bubbles, Interface, Markers, Curve)
+class ShearMembrane(Spec):
+    """A sphere that reacts to its change of area and to shear (3.3), carried by the backward map.
+
+    ``law``: quadratic (3.65), linear (E₂' = λ₂), neo-hookean or skalak, see `fsiwork.bodies.shear`; ``area`` and
+    ``shear`` are λ₁ and λ₂. The shape is that at t = 0, ``inflation`` its radius over that at rest; ``twist``: t₀ (3.67).
+    """
+
+    stretch: ClassVar = 1.0
+    inside: ClassVar = None
+    transport: ClassVar = Transport(scheme="upwind5", carry="map")
+
+    kind: Literal["shear-membrane"] = "shear-membrane"
+    shape: one_of(Ball)
+    law: Literal["quadratic", "linear", "neo-hookean", "skalak"] = "quadratic"
+    area: NotNegative = 0.0
+    shear: Positive
+    width: Width
+    twist: Number = 0.0
+    inflation: Positive = 1.0
+
+    @sense
+    def _law_fits(self) -> Iterator[Fault]:
+        if self.law == "neo-hookean" and self.area:
+            yield ("area",), f"a neo-hookean membrane has the modulus shear alone, got {self.area}"
+
+    def misfits(self, dim: int, kinds: set[str]) -> Iterator[Fault]:
+        """What does not fit a box of so many directions with sides of these kinds."""
+        if dim != 3:
+            yield ("kind",), f"shear-membrane is for three directions, the box has {dim}"
+        for name, rest in (("twist", 0.0), ("inflation", 1.0)):
+            if getattr(self, name) != rest and "periodic" in kinds:
+                yield (name,), "needs a box without periodic sides: Y is not periodic"
+
+
+Body = one_of(Membrane, Bubbles, Interface, Markers, Curve, ShearMembrane)

@@ -1,0 +1,179 @@
+"""A closed membrane in space that reacts to its change of area and to shear (3.3), by the backward map Y."""
+
+import numpy as np
+
+from fsiwork.bodies.backward import BackwardMap
+from fsiwork.bodies.band import Band
+from fsiwork.bodies.body import Body
+from fsiwork.bodies.inside import Inside
+from fsiwork.core.edges import Edges
+from fsiwork.core.grid import Grid
+from fsiwork.core.kernels import shear as kernels
+from fsiwork.core.transport import Transport
+
+LAWS = {
+    "quadratic": kernels.QUADRATIC,
+    "linear": kernels.LINEAR,
+    "neo-hookean": kernels.NEO_HOOKEAN,
+    "skalak": kernels.SKALAK,
+}
+LIMIT = 2.8  # explicit limit over Δx√(ρε/M) (MEASURED-coupling 6)
+XYZ = "xyz"
+
+
+class ShearMembrane(Body):
+    """A ball's surface with the energy ∫E(Z₁, Z₂) D_ε(φ)/J₀ dx, φ = |Y - centre| - radius at rest (SPEC 7).
+
+    The force is minus the gradient by Y of the discrete energy at the nodes, Σ_q g_q ∂_iY_q with the very derivative of
+    the transport; it goes through one filter (1, 2, 1)/4, and so does the velocity that carries Y: the pair stays
+    adjoint, and no energy is made but by the time step.
+
+    Parameters
+    ----------
+    grid, edges : where; three directions
+    centre, radius : the sphere as it stands at t = 0 [length]
+    law : ``quadratic`` E₁' = λ₁(Z₁ - 1), E₂' = λ₂(Z₂ - 1) (3.65); ``linear`` the same E₁, E₂' = λ₂ (shear modulus λ₂);
+        ``neo-hookean`` ½λ₂(2Z₁Z₂ + Z₁⁻² - 3); ``skalak`` ¼λ₂(I₁² + 2I₁ - 2I₂) + ¼λ₁I₂², I₁ = 2Z₁Z₂ - 2, I₂ = Z₁² - 1
+    area, shear : λ₁, λ₂ [energy per area at rest]
+    eps : half-width ε of the plain D_ε, in lengths at rest
+    twist : t₀ of (3.67) [angle/length], about the axis through the centre along z
+    inflation : radius at t = 0 over that at rest; J₀ is its cube
+
+    Attributes
+    ----------
+    map, phi : the backward map and φ(Y), flat fields at centres
+
+    Raises
+    ------
+    ValueError : not three directions, an unknown law, or a twist in a box that is periodic along x, y or z
+    """
+
+    def __init__(
+        self, grid: Grid, edges: Edges, centre, radius: float, law: str, area: float, shear: float, eps: float,
+        *, twist: float = 0.0, inflation: float = 1.0,
+    ):  # fmt: skip
+        if grid.dim != 3:
+            raise ValueError(f"a membrane with shear needs three directions, got {grid.dim}")
+        if law not in LAWS:
+            raise ValueError(f"law must be one of {', '.join(LAWS)}, got {law!r}")
+        if (twist or inflation != 1.0) and any(edges.periodic(a) for a in grid.axes):
+            raise ValueError("a membrane with pre-stress needs a box with walls: its Y is not periodic")
+        self.grid, self.edges, self.eps, self.inflation = grid, edges, float(eps), float(inflation)
+        self.weight, self._law = self.inflation**-3, LAWS[law]
+        self._rest = float(radius) / self.inflation
+        self._centre = np.array(centre, float)
+        self._numbers = np.array([grid.h, self.eps, self._rest, self.weight, float(area), float(shear)])
+        self._period = np.array([grid.length[a] if edges.periodic(a) else 0.0 for a in grid.axes])
+        self.map = BackwardMap(grid, edges, Transport(grid, edges, "upwind5", centring=2))
+        if twist or inflation != 1.0:
+            self._strain(float(twist))
+        self._plan()
+
+    # --- verbs ------------------------------------------------------------------------------------------------
+    def push(self, flow, dt: float) -> None:
+        """Add the force to ``flow.force``."""
+        g, (x, y, _) = self.grid, self.grid.strides
+        gradient, band = self.gradient(), self._band_now()
+        for a, s in enumerate(g.strides):
+            kernels.smooth(self._u[a], flow.u[a], *g.rows(0, 1), x, y, 0.0)
+            self._q.fill(0.0)
+            kernels.pulls(self._q, *gradient, *self.map.Y, self._u[a], band.runs, s, g.h)
+            self.edges.fill_scalar(self._q, "mirror")
+            kernels.to_faces(self._u[a], self._q, *g.rows(1, 1), s)
+            kernels.smooth(flow.force[a], self._u[a], *g.rows(), x, y, 1.0)
+
+    def move(self, flow, dt: float) -> None:
+        """Carry Y with the filtered new velocity."""
+        x, y, _ = self.grid.strides
+        for a in self.grid.axes:
+            kernels.smooth(self._u[a], flow.u[a], *self.grid.rows(0, 1), x, y, 0.0)
+        self.map.move(self._u, dt)
+        self._fresh = False
+
+    # --- answers ----------------------------------------------------------------------------------------------
+    def gradient(self) -> list[np.ndarray]:
+        """Derivatives of the energy over Δx³ by the components of Y, flat centre fields; valid until the next call."""
+        band = self._band_now()
+        for q in self._g:
+            q.fill(0.0)
+        kernels.stress(self._P, *self.map.Y, band.runs, self._s, self._numbers, self._law, self._centre, self._period)
+        kernels.gradients(*self._g, self._P, band.runs, self._s, self.grid.h)
+        return self._g
+
+    def longest_step(self, flow) -> dict[str, float]:
+        """2.8 Δx √(ρε/M), M the largest modulus of small waves over the band."""
+        top = float(self.survey()[kernels.STIFF])
+        limit = LIMIT * self.grid.h * np.sqrt(flow.density * self.eps / top) if top > 0.0 else np.inf
+        return {"elastic, shear": float(limit)}
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Y."""
+        return {f"Y_{XYZ[a]}": q.copy() for a, q in enumerate(self.map.Y)}
+
+    def restore(self, state: dict[str, np.ndarray]) -> None:
+        """Take back a `state`."""
+        for a, q in enumerate(self.map.Y):
+            q[:] = state[f"Y_{XYZ[a]}"]
+        self._fresh = False
+
+    def fields(self) -> dict[str, np.ndarray]:
+        """φ and the components of Y, flat fields at centres."""
+        self._band_now()
+        return {"phi": self.phi} | {f"Y_{XYZ[a]}": q for a, q in enumerate(self.map.Y)}
+
+    def gauges(self, flow) -> dict[str, float]:
+        """Volume, area, elastic energy, centroid, half-extents along the lines through it; over the band: extremes of
+        Z₁, Z₂ and the least J₀ det ∇Y; the mean of Z₂ - 1 over the surface (``shear_mean``), and both norms (3.68) of
+        J₀ det ∇Y - 1 (``rms_box``, ``rms_surface``)."""
+        values, g = self.survey(), self.grid
+        volume, centre = self._inside.volume(self.phi, self._band)
+        out = {"volume": volume, "area": float(values[kernels.AREA]), "elastic_energy": float(values[kernels.ENERGY])}
+        for a in g.axes:
+            out[f"centroid_{XYZ[a]}"] = centre[a]
+            out[f"axis_{XYZ[a]}"] = self._inside.half_extent(self.phi, centre, a) if volume > 0.0 else 0.0
+        names = {"Z1_min": kernels.LEAST1, "Z1_max": kernels.MOST1, "Z2_min": kernels.LEAST2, "Z2_max": kernels.MOST2}
+        out |= {name: float(values[k]) for name, k in names.items()} | {"det_min": float(values[kernels.LEAST_DET])}
+        area = values[kernels.AREA] or np.nan
+        out["shear_mean"] = float(values[kernels.SHEARED] / area)
+        out["rms_surface"] = float(np.sqrt(values[kernels.SQUARES] / area))
+        kernels.determinants(self._row, *self.map.Y, *g.rows(), *g.strides[:2], g.h, self.weight)
+        return out | {"rms_box": float(np.sqrt(self._row.mean() / g.n[-1]))}
+
+    def survey(self) -> np.ndarray:
+        """Integrals and extremes over the band, columns named in `core.kernels.shear`; kept until Y moves."""
+        band = self._band_now()
+        if self._values is None:
+            table = np.zeros((band.inside.shape[0], 10))
+            where = self._numbers, self._law, self._centre, self._period
+            kernels.survey(table, *self.map.Y, band.inside, self._s, *where)
+            values = table.max(axis=0, initial=-np.inf)
+            least = [kernels.LEAST_DET, kernels.LEAST1, kernels.LEAST2]
+            values[least] = table[:, least].min(axis=0, initial=np.inf)
+            values[: kernels.SUMS] = table[:, : kernels.SUMS].sum(axis=0) * self.grid.cell_volume
+            self._values = values
+        return self._values
+
+    # --- parts ------------------------------------------------------------------------------------------------
+    def _strain(self, twist: float) -> None:
+        """Y(x, 0) by (3.67), over the inflation."""
+        x, y, z = self.grid.points()
+        x, y, z = (q - c for q, c in zip((x, y, z), self._centre, strict=True))
+        cos, sin = np.cos(twist * z), np.sin(twist * z)
+        for q, c, values in zip(self.map.Y, self._centre, (x * cos + y * sin, y * cos - x * sin, z), strict=True):
+            self.grid.padded(q)[...] = c + values / self.inflation
+
+    def _plan(self):
+        g = self.grid
+        self._P = np.zeros((g.size, 12))  # pages that the band never touches cost nothing
+        self._g, self._u = [g.field() for _ in g.axes], [g.field() for _ in g.axes]
+        self._q, self.phi = g.field(), g.field()
+        self._band, self._inside = Band(g, self.eps, False), Inside(g, self.edges, self.eps)
+        self._s, self._row = np.array(g.strides), np.zeros(g.rows()[0].size)
+        self._fresh, self._values = False, None
+
+    def _band_now(self) -> Band:
+        if not self._fresh:
+            kernels.distances(self.phi, *self.map.Y, self._centre, self._period, self._rest)
+            self._band.find(self.phi)
+            self._fresh, self._values = True, None
+        return self._band

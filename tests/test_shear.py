@@ -1,0 +1,209 @@
+"""A membrane with shear: energy and its gradient, power of the force, invariants, a sphere at rest and in motion."""
+
+import numpy as np
+import pytest
+
+from fsiwork.bodies.shear import LAWS, ShearMembrane
+from fsiwork.core import energy
+from fsiwork.core.edges import Edges, Side
+from fsiwork.core.flow import Flow
+from fsiwork.core.grid import GHOSTS, Grid
+from fsiwork.core.invariants import area_and_shear, map_gradient
+from fsiwork.core.kernels import shear as kernels
+from fsiwork.scene import SceneError, loads
+from fsiwork.simulate import step
+
+ORIGIN = (-1.0, -1.0, -1.0)
+
+
+def sphere(n=16, law="quadratic", kind="no-slip", eps=0.3, radius=0.5, **more):
+    grid = Grid((n,) * 3, 2 / n, ORIGIN)
+    edges = Edges(grid, ((Side(kind),) * 2,) * 3)
+    body = ShearMembrane(
+        grid, edges, (0.0, 0.0, 0.0), radius, law, 1.3 if law != "neo-hookean" else 0.0, 0.7, eps, **more
+    )
+    return body, Flow(grid, edges, 1.0, 0.01)
+
+
+def stored(body):
+    body._fresh = False
+    return float(body.survey()[kernels.ENERGY])
+
+
+@pytest.mark.parametrize("law", sorted(LAWS))
+def test_slopes_of_the_laws(law):
+    d, at = 1e-5, (1.2, 1.4)
+    E, *slopes = kernels.energy(LAWS[law], 1.3, 0.7, *at)
+    for a, (first, second) in enumerate(((0, 2), (1, 3))):
+        high, low = (
+            kernels.energy(LAWS[law], 1.3, 0.7, *(z + s * d * (a == k) for k, z in enumerate(at))) for s in (1, -1)
+        )
+        assert slopes[first] == pytest.approx((high[0] - low[0]) / (2 * d), rel=1e-7)
+        assert slopes[second] == pytest.approx((high[0] - 2 * E + low[0]) / d**2, rel=1e-3, abs=1e-4)
+    assert kernels.energy(LAWS[law], 1.3, 0.7, 1.0, 1.0)[0] == pytest.approx(0.0, abs=1e-15)
+
+
+@pytest.mark.parametrize("law", sorted(LAWS))
+def test_the_gradient_is_that_of_the_discrete_energy(law):
+    body, _ = sphere(12, law, twist=1.5, inflation=1.1)
+    random = np.random.default_rng(1)
+    for Y in body.map.Y:
+        Y += 0.02 * random.normal(size=Y.size)
+    body._fresh = False
+    g = [q.copy() for q in body.gradient()]
+    along = [random.normal(size=Y.size) for Y in body.map.Y]
+    start = [Y.copy() for Y in body.map.Y]
+    energies = {}
+    for d in (-1e-6, 1e-6):
+        for Y, Y0, v in zip(body.map.Y, start, along, strict=True):
+            Y[:] = Y0 + d * v
+        energies[d] = stored(body)
+    rate = body.grid.cell_volume * sum(float(q @ v) for q, v in zip(g, along, strict=True))
+    assert abs(rate) > 0.1
+    assert rate == pytest.approx((energies[1e-6] - energies[-1e-6]) / 2e-6, rel=1e-6)
+
+
+def test_the_power_of_the_force_is_what_the_energy_loses():
+    body, flow = sphere(16, kind="periodic")
+    grid, random = body.grid, np.random.default_rng(2)
+    for k, Y in enumerate(body.map.Y):
+        Y += grid.sample(lambda x, y, z, k=k: 0.05 * np.sin(np.pi * (x + 2 * y - z) + k))
+    body._fresh = False
+    for c in grid.axes:
+        grid.inside(flow.u[c])[...] = random.normal(size=grid.n)
+    flow.edges.fill_velocity(flow.u)
+    body.push(flow, 0.0)
+    power = grid.cell_volume * sum(
+        float((grid.inside(flow.force[c]) * grid.inside(flow.u[c])).sum()) for c in grid.axes
+    )
+    before, d, energies = body.state(), 1e-5, [stored(body)]
+    for k in (1, 2):
+        body.restore(before)
+        body.move(flow, k * d)
+        energies.append(stored(body))
+    rate = (-3 * energies[0] + 4 * energies[1] - energies[2]) / (2 * d)
+    assert abs(power) > 0.01
+    assert power == pytest.approx(-rate, rel=1e-6)
+
+
+def test_invariants_are_those_of_the_continuum():
+    """Z₁ and Z₂ of an affine map, by the kernels and by `core.invariants`."""
+    body, _ = sphere(12)
+    M = np.array([[1.1, 0.3, -0.2], [0.1, 0.8, 0.25], [-0.15, 0.05, 1.2]])
+    grid, x = body.grid, body.grid.points()
+    for Y, row in zip(body.map.Y, M, strict=True):
+        grid.padded(Y)[...] = sum(m * q for m, q in zip(row, x, strict=True))
+    body._fresh = False
+    values = body.survey()
+    nodes = np.stack(np.meshgrid(*[grid.coordinate(a) - 0.5 * grid.h for a in grid.axes], indexing="ij"), -1)
+    place = nodes.reshape(-1, 3) @ M.T
+    distance = np.linalg.norm(place, axis=1)
+    near = np.abs(distance - 0.5) < 0.3
+    Z1, Z2 = area_and_shear(np.broadcast_to(M, (near.sum(), 3, 3)), place[near] / distance[near, None])
+    found = values[[kernels.LEAST1, kernels.MOST1, kernels.LEAST2, kernels.MOST2]]
+    assert found == pytest.approx([Z1.min(), Z1.max(), Z2.min(), Z2.max()], rel=1e-12)
+    assert Z2.max() > 1.2
+    assert values[kernels.LEAST_DET] == pytest.approx(np.linalg.det(M), rel=1e-12)
+
+
+def test_the_prestress_is_that_of_the_book():
+    """(3.67): Z₁ = 1 and Z₂ = 1 + 2t₀²(x² + y²)² for r = ½; inflation multiplies Z₁ by its square."""
+    body, _ = sphere(48, eps=0.1, twist=1.0, inflation=1.1)
+    g, x = body.grid, body.grid.points(ghosts=GHOSTS)
+    r2 = np.broadcast_to(sum(q**2 for q in x), g.shape).ravel()
+    nodes = np.flatnonzero(np.abs(np.sqrt(r2) - 0.5) < 0.01)
+    at = np.stack([np.broadcast_to(q, g.shape).ravel()[nodes] for q in x], axis=1)
+    Y = np.stack([q[nodes] for q in body.map.Y], axis=1)
+    Z1, Z2 = area_and_shear(map_gradient(g, body.map.Y, nodes), Y)
+    assert np.abs(Z1 - 1.21).max() < 1e-3
+    scale = 0.25 / r2[nodes]  # Z₂ - 1 = t₀²(x² + y²)²/(2 r²) on the sphere through the node
+    assert np.abs(Z2 - 1 - 2 * scale * (at[:, 0] ** 2 + at[:, 1] ** 2) ** 2).max() < 1e-3
+    assert body.survey()[kernels.AREA] == pytest.approx(np.pi, rel=0.01)
+
+
+def test_a_resting_sphere_stays():
+    body, flow = sphere(20, eps=0.2)
+    for _ in range(5):
+        step(flow, (body,), 0.02)
+    assert max(flow.largest(u) for u in flow.u) < 1e-12
+    assert body.gauges(flow)["elastic_energy"] < 1e-20
+
+
+def test_an_inflated_sphere_carries_its_pressure():
+    """p inside less p outside is 2T/r, T = E₁'(1.21): energies are per area at rest."""
+    body, flow = sphere(32, eps=0.15, inflation=1.1)
+    for _ in range(10):
+        step(flow, (body,), 0.01)
+    p = flow.pressure()
+    assert p[16, 16, 16] - p[1, 16, 16] == pytest.approx(2 * 1.3 * 0.21 / 0.5, rel=0.05)
+    assert max(flow.largest(u) for u in flow.u) < 0.03
+    found = body.gauges(flow)
+    assert [found["Z1_min"], found["Z1_max"]] == pytest.approx([1.21, 1.21], rel=0.05)
+    assert found["volume"] == pytest.approx(4 / 3 * np.pi * 0.125, rel=0.05)
+
+
+def test_no_energy_out_of_nothing_and_the_axes_stay_alike():
+    body, flow = sphere(20, eps=0.2, twist=2.0)
+    rows = []
+    for _ in range(20):
+        rows.append((energy.kinetic_energy(flow), energy.dissipation(flow), body.gauges(flow)))
+        step(flow, (body,), 0.01)
+    stores = np.array([k + gauges["elastic_energy"] for k, _, gauges in rows])
+    lost = np.array([d for _, d, _ in rows])
+    made = stores - stores[0] + np.concatenate([[0.0], np.cumsum(0.005 * (lost[1:] + lost[:-1]))])
+    assert rows[-1][0] > 0.01 * stores[0]
+    assert made.max() < 0.01 * stores[0]
+    assert made.min() > -0.1 * stores[0]
+    last = rows[-1][2]
+    assert last["axis_x"] == pytest.approx(last["axis_y"], rel=1e-3)
+    assert min(gauges["det_min"] for *_, gauges in rows) > 0.5
+    assert last["shear_mean"] < rows[0][2]["shear_mean"]
+
+
+def test_a_state_goes_on_bit_for_bit():
+    body, flow = sphere(16, twist=1.0)
+    step(flow, (body,), 0.01)
+    kept = body.state(), flow.state()
+    step(flow, (body,), 0.01)
+    Y = body.map.Y[0].copy()
+    body.restore(kept[0])
+    flow.restore(kept[1])
+    step(flow, (body,), 0.01)
+    assert np.array_equal(Y, body.map.Y[0])
+
+
+def test_what_cannot_be_is_refused():
+    with pytest.raises(ValueError, match="law must be one of"):
+        sphere(law="rubber")
+    with pytest.raises(ValueError, match="not periodic"):
+        sphere(kind="periodic", twist=1.0)
+    grid = Grid((8, 8), 0.25)
+    with pytest.raises(ValueError, match="three directions"):
+        ShearMembrane(grid, Edges(grid, ((Side("no-slip"),) * 2,) * 2), (0, 0), 0.5, "linear", 1.0, 1.0, 0.3)
+
+
+@pytest.mark.parametrize(
+    ("change", "line"),
+    [
+        ({"bodies.0.shear": -1}, "bodies.0.shear: must be positive, got -1"),
+        ({"bodies.0.law": "rubber"}, "bodies.0.law: "),
+        ({"bodies.0.law": "neo-hookean"}, "bodies.0.area: a neo-hookean membrane has the modulus shear alone"),
+        ({"bodies.0.inflation": 0}, "bodies.0.inflation: must be positive, got 0"),
+        ({"box.edges": "periodic"}, "bodies.0.twist: needs a box without periodic sides"),
+        ({"bodies.0.shape.kind": "torus"}, "bodies.0.shape"),
+        ({"bodies.0.shape.radius": 1.5}, "bodies.0.shape: leaves the box along x"),
+        ({"bodies.0.width.cells": 0.5}, "bodies.0.width.cells: ε = "),
+    ],
+)
+def test_bad_scenes_say_why(change, line):
+    text = """
+box: {length: [2, 2, 2], cells: 16, edges: walls}
+fluid: {density: 1, viscosity: 0.01}
+bodies:
+  - {kind: shear-membrane, shape: {kind: ball, centre: [1, 1, 1], radius: 0.5}, area: 1, shear: 1, twist: 1,
+     width: {cells: 2}}
+clock: {end: 1, step: 0.01}
+"""
+    with pytest.raises(SceneError) as error:
+        loads(text, change)
+    assert line in str(error.value)
