@@ -1,13 +1,14 @@
-"""The force of a membrane (3.18) in three discrete forms; the law says which is stable (MEASURED-coupling 2)."""
+"""The force of a membrane (3.18) in four discrete forms; the law says which is stable (MEASURED-coupling 2)."""
 
 import numpy as np
 
 from fsiwork.bodies.band import Band
 from fsiwork.bodies.laws import LINEAR, AtPoints
 from fsiwork.core.grid import Grid
+from fsiwork.core.kernels import korteweg
 from fsiwork.core.kernels import membrane as kernels
 
-FORMS = ("normal-tangential", "divergence", "split")
+FORMS = ("normal-tangential", "divergence", "split", "korteweg")
 
 
 class Pull:
@@ -18,7 +19,8 @@ class Pull:
     grid : where
     law : the energy, prepared for kernels
     form : ``normal-tangential`` (as written; balanced for a drop), ``divergence`` of E'|∇φ|(I - nn)D_ε (sums to
-        zero exactly), or ``split``: normal part from the curvature, tangential part from the divergence
+        zero exactly), ``split``: normal part from the curvature, tangential part from the divergence, or ``korteweg``:
+        -div((E'/|∇φ|) ∇φ⊗∇φ D_ε), which is the divergence less ∇(E'|∇φ|D_ε), so that only the pressure differs
     eps, renormalised : half-width of D_ε [length]; whether it is divided by |∇φ|, so that ε stays a length
     """
 
@@ -50,6 +52,25 @@ class Pull:
         for a, s in enumerate(self._first):
             kernels.stress_at_nodes(self._T, phi, runs, s, False, law.kind, self.numbers, law.given[1])
             kernels.add_normal(force[a], self._T, runs, s, h)
+        self._shear(force, phi, band)
+
+    def korteweg(self, force: list[np.ndarray], phi: np.ndarray, band: Band) -> None:
+        """F_a -= Σ_b ∂_b Σ_ab, Σ = (E'/|∇φ|) ∇φ⊗∇φ D_ε (3.24), (3.27), for any law E.
+
+        Σ_aa at centres and Σ_ab at nodes: from Σ_aa at nodes the difference to `divergence` would be a gradient of the
+        grid, to rounding.
+        """
+        law, runs = self.law, band.runs
+        law.centres(phi, runs, band.cells, self._straight)
+        for a, s in enumerate(self._first):
+            korteweg.normal_stress(self._tau, phi, runs, s, law.kind, self.numbers, law.given[1])
+            korteweg.add_difference(force[a], self._tau, runs, s[0], self.grid.h)
+        law.nodes(phi, runs, band.cells, self._straight)
+        self._shear(force, phi, band)
+        kernels.clear(self._tau, runs)
+
+    def _shear(self, force, phi, band):
+        law, runs, h = self.law, band.runs, self.grid.h
         for a, b, s in self._pairs:
             kernels.stress_at_nodes(self._T, phi, runs, s, True, law.kind, self.numbers, law.given[1])
             kernels.add_shear(force[a], self._T, runs, s[1], s[2], h)
