@@ -171,10 +171,16 @@ class Scene(Spec):
         if isinstance(body, ShearMembrane):
             kinds = {side.kind for pair in self.box.sides for side in pair}
             yield from ((("bodies", i, *path), text) for path, text in body.misfits(self.box.dim, kinds))
+        if isinstance(body, Curve) and body.shape.normal in self._periodic:
+            yield ("bodies", i, "shape", "normal"), "the ring must not lie across a periodic direction: φ¹ would jump"
         for where, shape in _shapes(body):
             misfits = list(shape.misfits(self.box.dim))
             for path, text in misfits or _outside(shape, self.box):
                 yield ("bodies", i, *where, *path), text
+
+    @property
+    def _periodic(self) -> str:
+        return "".join(x for x, (low, _) in zip("xyz", self.box.sides, strict=False) if low.kind == "periodic")
 
     def _width_fits(self, i: int, body) -> Iterator[Fault]:
         h, width = self.box.h, body.width
