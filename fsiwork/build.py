@@ -131,6 +131,7 @@ def _shear_membrane(spec, grid: Grid, edges: Edges) -> ShearMembrane:
         spec.area,
         spec.shear,
         spec.width.of(grid.h),
+        volume=spec.volume,
         twist=spec.twist,
         inflation=spec.inflation,
     )

@@ -35,6 +35,8 @@ class ShearMembrane(Body):
     law : ``quadratic`` E₁' = λ₁(Z₁ - 1), E₂' = λ₂(Z₂ - 1) (3.65); ``linear`` the same E₁, E₂' = λ₂ (shear modulus λ₂);
         ``neo-hookean`` ½λ₂(2Z₁Z₂ + Z₁⁻² - 3); ``skalak`` ¼λ₂(I₁² + 2I₁ - 2I₂) + ¼λ₁I₂², I₁ = 2Z₁Z₂ - 2, I₂ = Z₁² - 1
     area, shear : λ₁, λ₂ [energy per area at rest]
+    volume : κ [energy per area at rest] of ½κ(J₀ det ∇Y - 1)², which a flow without divergence leaves at 0: it holds
+        against the transport's errors of det ∇Y, by which the discrete energy of a membrane under tension can fall
     eps : half-width ε of the plain D_ε, in lengths at rest
     twist : t₀ of (3.67) [angle/length], about the axis through the centre along z
     inflation : radius at t = 0 over that at rest; J₀ is its cube
@@ -50,7 +52,7 @@ class ShearMembrane(Body):
 
     def __init__(
         self, grid: Grid, edges: Edges, centre, radius: float, law: str, area: float, shear: float, eps: float,
-        *, twist: float = 0.0, inflation: float = 1.0,
+        *, volume: float = 0.0, twist: float = 0.0, inflation: float = 1.0,
     ):  # fmt: skip
         if grid.dim != 3:
             raise ValueError(f"a membrane with shear needs three directions, got {grid.dim}")
@@ -62,7 +64,7 @@ class ShearMembrane(Body):
         self.weight, self._law = self.inflation**-3, LAWS[law]
         self._rest = float(radius) / self.inflation
         self._centre = np.array(centre, float)
-        self._numbers = np.array([grid.h, self.eps, self._rest, self.weight, float(area), float(shear)])
+        self._numbers = np.array([grid.h, self.eps, self._rest, self.weight, float(area), float(shear), float(volume)])
         self._period = np.array([grid.length[a] if edges.periodic(a) else 0.0 for a in grid.axes])
         self.map = BackwardMap(grid, edges, Transport(grid, edges, "upwind5", centring=2))
         if twist or inflation != 1.0:

@@ -273,8 +273,8 @@ class ShearMembrane(Spec):
     """A sphere that reacts to its change of area and to shear (3.3), carried by the backward map.
 
     ``law``: quadratic (3.65), linear (E₂' = λ₂), neo-hookean or skalak, see `fsiwork.bodies.shear`; ``area`` and
-    ``shear`` are λ₁ and λ₂. The shape is that at t = 0, ``inflation`` its radius over that at rest, ``twist`` t₀ of
-    (3.67).
+    ``shear`` are λ₁ and λ₂, ``volume`` a modulus that holds det ∇Y. The shape is that at t = 0,
+    ``inflation`` its radius over that at rest, ``twist`` t₀ of (3.67).
     """
 
     stretch: ClassVar = 1.0
@@ -286,6 +286,7 @@ class ShearMembrane(Spec):
     law: Literal["quadratic", "linear", "neo-hookean", "skalak"] = "quadratic"
     area: NotNegative = 0.0
     shear: Positive
+    volume: NotNegative = 0.0
     width: Width
     twist: Number = 0.0
     inflation: Positive = 1.0

@@ -2,7 +2,7 @@
 
 A node is the low corner of the cell of its index; ∇Y there are compact differences of the 8 cells around, Ȳ is
 their mean. ``period`` holds the lengths of the box along periodic directions, else 0. ``numbers`` = (h, ε, radius at
-rest, weight of the energy, modulus of area, of shear); ``law`` is a code from below. Runs as in `kernels.membrane`.
+rest, weight of the energy, moduli of area, shear, volume); ``law`` is a code from below. Runs as in `kernels.membrane`.
 """
 
 import numpy as np
@@ -140,7 +140,7 @@ def surface(w, det, m):
 def stress(out, Y0, Y1, Y2, runs, s, numbers, law, centre, period):
     """Derivatives of D_ε E at each node of the runs: out[I, :9] by ∇Y (-D FᵀT, by rows), out[I, 9:] by Ȳ.
 
-    T = Σ E_i' Z_i C_i; by Ȳ it is D'Em + D(∂m/∂Y)ᵀk, k = -2Fᵀ[(e₁ + e₂TrA)I - e₂A]Fm.
+    T = Σ E_i' Z_i C_i - κ(j - 1)j I, j = det ∇Y/weight; by Ȳ it is D'Em + D(∂m/∂Y)ᵀk, k = -2Fᵀ[(e₁ + e₂TrA)I - e₂A]Fm.
     """
     x, y, h, eps, radius = s[0], s[1], numbers[0], numbers[1], numbers[2]
     for t in prange(runs.shape[0]):
@@ -157,11 +157,13 @@ def stress(out, Y0, Y1, Y2, runs, s, numbers, law, centre, period):
             E, dE1, dE2, _, _ = energy(law, numbers[4], numbers[5], Z1, Z2)
             D = numbers[3] * 0.5 * (1.0 + np.cos(np.pi * phi)) / eps
             slope = -numbers[3] * 0.5 * np.pi * np.sin(np.pi * phi) / (eps * eps)
-            a, b = dE1 * Z1 - dE2 * Z2, dE2 / Z1
+            a, b, change = dE1 * Z1 - dE2 * Z2, dE2 / Z1, det / numbers[3] - 1.0
+            E += 0.5 * numbers[6] * change * change
+            v = numbers[6] * change * (1.0 + change)
             T = (
-                a * (1.0 - n[0] * n[0]) + b * A[0], b * A[3] - a * n[0] * n[1], b * A[4] - a * n[0] * n[2],
-                b * A[3] - a * n[0] * n[1], a * (1.0 - n[1] * n[1]) + b * A[1], b * A[5] - a * n[1] * n[2],
-                b * A[4] - a * n[0] * n[2], b * A[5] - a * n[1] * n[2], a * (1.0 - n[2] * n[2]) + b * A[2],
+                a * (1.0 - n[0] * n[0]) + b * A[0] - v, b * A[3] - a * n[0] * n[1], b * A[4] - a * n[0] * n[2],
+                b * A[3] - a * n[0] * n[1], a * (1.0 - n[1] * n[1]) + b * A[1] - v, b * A[5] - a * n[1] * n[2],
+                b * A[4] - a * n[0] * n[2], b * A[5] - a * n[1] * n[2], a * (1.0 - n[2] * n[2]) + b * A[2] - v,
             )  # fmt: skip
             for j in range(3):
                 column = transposed(F, (T[j], T[3 + j], T[6 + j]))
@@ -265,6 +267,7 @@ def survey(out, Y0, Y1, Y2, runs, s, numbers, law, centre, period):
             size, Z1, Z2 = surface(w, det, m)[5:]
             E, dE1, dE2, ddE1, ddE2 = energy(law, numbers[4], numbers[5], Z1, Z2)
             D, change = 0.5 * (1.0 + np.cos(np.pi * phi)) / eps, det / numbers[3]
+            E += 0.5 * numbers[6] * (change - 1.0) * (change - 1.0)
             out[t, ENERGY] += numbers[3] * D * E
             out[t, AREA] += D * size
             out[t, SHEARED] += (Z2 - 1.0) * D * size
