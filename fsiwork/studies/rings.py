@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline, RegularGridInterpolator
 from fsiwork.core.integrals import line_integral
 from fsiwork.scene import Scene
 from fsiwork.simulate import Simulation, build
-from fsiwork.studies.orders import slope
+from fsiwork.studies.orders import observed_orders
 
 STRETCHES = (1.25, 1.5)
 EVERY = 4  # steps between two rows
@@ -102,8 +102,8 @@ def measure(datasets: Mapping[str, xr.Dataset]) -> dict[str, float]:
     """By way of carrying, stretch and N, in percent: gap in radius to the markers over that radius (``gap``) and over
     the whole change (``of_change``); Z₃ on the curve against s times its circumference over the first (``z3``), and its
     mean over the tube against the line integral (``z3_length``); energy made over what could be released (``made``).
-    Without N: on the finest grid, the larger of field and map. ``z3_order``, ``z3_length_order``: slopes of the two
-    over Δx with a tube of fixed width, ``fixed_1.25``."""
+    Without N: on the finest grid, the larger of field and map. ``z3_order``, ``z3_length_order``: of the two, with a
+    tube of fixed width (``fixed_1.25``), between the two finest grids."""
     data, out = datasets["curve_ring"], {}
     finest = int(data["cells"].max())
     for s in STRETCHES:
@@ -124,7 +124,7 @@ def measure(datasets: Mapping[str, xr.Dataset]) -> dict[str, float]:
         out |= _kinematics(data, "fixed", STRETCHES[0], n)
     for name in ("z3", "z3_length"):
         errors = [out[f"{name}_fixed_{STRETCHES[0]:g}_{n:g}"] for n in data["cells"].values]
-        out[f"{name}_order"] = slope(1 / data["cells"], errors)
+        out[f"{name}_order"] = float(observed_orders(1 / data["cells"], errors)[-1])
     return out
 
 
