@@ -47,24 +47,25 @@ def at(grid: Grid, q: np.ndarray, points: np.ndarray, face: int | None = None, o
     return map_coordinates(grid.padded(q), where, order=order, mode="nearest")
 
 
+def _velocity(sim, points: np.ndarray) -> np.ndarray:
+    return np.stack([at(sim.flow.grid, q, points, face=a) for a, q in enumerate(sim.flow.u)], -1)
+
+
 def _carry(sim, points: np.ndarray) -> np.ndarray:
     """Markers after the last step: midpoint rule with the new velocity."""
-
-    def velocity(x):
-        return np.stack([at(sim.flow.grid, q, x, face=a) for a, q in enumerate(sim.flow.u)], -1)
-
-    return points + sim.dt * velocity(points + 0.5 * sim.dt * velocity(points))
+    return points + sim.dt * _velocity(sim, points + 0.5 * sim.dt * _velocity(sim, points))
 
 
-def _profile(sim, axis: int) -> np.ndarray:
-    """Pressure at `STATIONS` along an axis from the middle of the box."""
-    grid = sim.flow.grid
-    points = np.zeros((STATIONS.size, 3))
-    points[:, axis] = STATIONS
-    p = grid.field()
+def _profiles(sim, k: int) -> dict[str, np.ndarray]:
+    """Pressure and φ at `STATIONS` along x and z from the middle of the box, named with the number ``k``."""
+    grid, p, out = sim.flow.grid, sim.flow.grid.field(), {}
     grid.inside(p)[...] = sim.flow.pressure()
     sim.flow.edges.fill_scalar(p, "mirror")
-    return at(grid, p, points)
+    for name, axis in (("x", 0), ("z", 2)):
+        points = np.zeros((STATIONS.size, 3))
+        points[:, axis] = STATIONS
+        out |= {f"p_{name}_{k}": at(grid, p, points), f"phi_{name}_{k}": at(grid, sim.bodies[0].phi, points)}
+    return out
 
 
 def _roundness(sim, radius: float) -> float:
@@ -90,8 +91,7 @@ def relax(scene, point: dict[str, Any]) -> dict[str, Any]:
     markers; the largest deviation from the sphere at the end. What a diverged run did not reach is NaN."""
     sim, spec = simulate.build(scene), scene.bodies[0]
     table = {name: np.full(ROWS + 1, math.nan) for name in ("t", *HISTORY, "created")}
-    out: dict[str, Any] = {f"p_{axis}_{k}": np.full(STATIONS.size, math.nan) for axis in "xz" for k in range(2)}
-    out |= {f"markers_{k}": np.full(globe().size, math.nan) for k in range(len(SHOTS))}
+    out: dict[str, Any] = {}
     points = twisted(globe().reshape(-1, 3) * spec.shape.radius, spec.twist)
     total, made, least, row, ended = math.nan, 0.0, math.inf, 0, ""
     while True:
@@ -105,9 +105,10 @@ def relax(scene, point: dict[str, Any]) -> dict[str, Any]:
         for k, t in enumerate(SHOTS):
             if abs(sim.t - t) < 0.5 * sim.dt:
                 out[f"markers_{k}"] = points.ravel()
+                out[f"speed_{k}"] = np.linalg.norm(_velocity(sim, points), axis=1)
         for k, t in enumerate(PRESSURE):
             if abs(sim.t - t) < 0.5 * sim.dt:
-                out |= {f"p_x_{k}": _profile(sim, 0), f"p_z_{k}": _profile(sim, 2)}
+                out |= _profiles(sim, k)
         if sim.steps == sim.total or (ended := sim.advance()):
             break
         points = _carry(sim, points)
@@ -128,30 +129,33 @@ def order(steps: list[float], curves: list[np.ndarray]) -> float:
     return brentq(excess, 0.01, 12.0) if excess(0.01) * excess(12.0) < 0 else math.nan
 
 
-def smeared(p: np.ndarray, surface: float, eps: float) -> tuple[float, float]:
-    """A profile across the membrane at ``surface``: its 10-90 % width over that of H_ε, and by how much of the jump it
-    leaves the range between both sides, within 2ε; the sides are means over 1.5 ε … 2 ε."""
-    r = STATIONS - surface
-    inner, outer = (p[(s * r >= 1.5 * eps) & (s * r <= 2 * eps)].mean() for s in (-1, 1))
-    share = (p - outer) / (inner - outer)
-    near = np.abs(r) <= 2 * eps
-    x, y = r[near], share[near]
-    high, low = np.flatnonzero(y >= 0.9), np.flatnonzero(y <= 0.1)
+def rise(r: np.ndarray, share: np.ndarray) -> float:
+    """From the last r < 0 where a profile falling from 1 to 0 is above .9 to the first r > 0 where it is below .1."""
+    high, low = np.flatnonzero((share >= 0.9) & (r < 0)), np.flatnonzero((share <= 0.1) & (r > 0))
     if not high.size or not low.size:
+        return math.nan
+    ends = [
+        r[k] + (share[k] - c) / (share[k] - share[k + 1]) * (r[k + 1] - r[k])
+        for c, k in ((0.9, high[-1]), (0.1, low[0] - 1))
+    ]
+    return float(ends[1] - ends[0])
+
+
+def smeared(p: np.ndarray, phi: np.ndarray, eps: float) -> tuple[float, float]:
+    """Profiles across the membrane: the 10-90 % width of p over that of H_ε(φ), and by how much of the jump p leaves
+    the range between both sides, |φ| ≤ 2ε; the sides are means over 1.5 ε ≤ |φ| ≤ 2 ε."""
+    far = (np.abs(phi) >= 1.5 * eps) & (np.abs(phi) <= 2 * eps)
+    if not (far & (phi < 0)).any() or not (far & (phi > 0)).any():
         return math.nan, math.nan
-    ends = []
-    for level, k in ((0.9, high[high <= x.size - 2][-1]), (0.1, low[0] - 1)):
-        ends.append(x[k] + (y[k] - level) / (y[k] - y[k + 1]) * (x[k + 1] - x[k]))
-    wanted = 2 * eps * brentq(lambda q: 0.5 * (1 + q + np.sin(np.pi * q) / np.pi) - 0.9, 0, 1)
-    return abs(ends[1] - ends[0]) / wanted, float(max(y.max() - 1, -y.min(), 0.0))
+    inner, outer = p[far & (phi < 0)].mean(), p[far & (phi > 0)].mean()
+    share, near = (p - outer) / (inner - outer), np.abs(phi) <= 2 * eps
+    r = STATIONS - np.interp(0.0, phi, STATIONS)
+    q = np.clip(phi / eps, -1, 1)
+    wanted = rise(r, 0.5 * (1 - q - np.sin(np.pi * q) / np.pi))
+    return rise(r[near], share[near]) / wanted, float(max(share[near].max() - 1, -share[near].min(), 0.0))
 
 
 GRIDS = ("n32", "n48", "n64")
-
-
-def eps_of(data: xr.Dataset) -> float:
-    """ε [length] of a study of runs that share it."""
-    return float(data["eps"].isel(case=0))
 
 
 def fig_3_18(datasets: Mapping[str, xr.Dataset]) -> dict[str, float]:
@@ -163,16 +167,14 @@ def fig_3_18(datasets: Mapping[str, xr.Dataset]) -> dict[str, float]:
         out[f"created_{case}"], out[f"det_{case}"] = float(one["created"].max()), float(one["det_min"][-1])
         for name in ("axis_x", "axis_z", "rms_box", "rms_surface", "volume"):
             out[f"{name}_{case}"] = float(one[name][-1])
-        out[f"steps_{case}"] = float(one["n_steps"])
     out["created"] = max(out[f"created_{case}"] for case in GRIDS)
     out["det"] = min(out[f"det_{case}"] for case in GRIDS)
     fine = data.sel(case=GRIDS[-1])
+    eps = float(fine["eps"])
     for axis in "xz":
-        for k, t in enumerate(PRESSURE):
-            place = float(np.interp(t, fine["t"], fine[f"axis_{axis}"]))
-            out[f"width_{axis}_{k}"], out[f"overshoot_{axis}_{k}"] = smeared(
-                fine[f"p_{axis}_{k}"].values, place, eps_of(data)
-            )
+        for k in range(len(PRESSURE)):
+            profiles = fine[f"p_{axis}_{k}"].values, fine[f"phi_{axis}_{k}"].values
+            out[f"width_{axis}_{k}"], out[f"overshoot_{axis}_{k}"] = smeared(*profiles, eps)
     for name in ("width", "overshoot"):
         out[name] = float(np.max([out[f"{name}_{axis}_{k}"] for axis in "xz" for k in range(2)]))  # NaN stays
     t, steps = fine["t"].values, [2.0 / int(case[1:]) for case in GRIDS]
@@ -194,3 +196,15 @@ def inflated(datasets: Mapping[str, xr.Dataset]) -> dict[str, float]:
         out[f"rise_{case}"] = float(max((b / a for a, b in pairwise(tops)), default=math.nan))
         out[f"created_{case}"], out[f"det_{case}"] = float(one["created"].max()), float(one["det_min"][-1])
     return out
+
+
+def rows(datasets: Mapping[str, xr.Dataset], measured: Mapping[str, float]) -> tuple[list[str], list[list]]:
+    """A row for each run: energy created, det ∇Y, norms (3.68) and radii at the end, cost."""
+    data = datasets["sheared_sphere"]
+    names = ("created", "det", "rms_box", "rms_surface", "axis_x", "axis_z", "volume")
+    table = []
+    for case in data["case"].values:
+        one = data.sel(case=case)
+        values = [float(f"{measured[f'{name}_{case}']:.4g}") for name in names]
+        table.append([str(case), int(one["n_steps"]), *values, round(float(one["cpu_seconds"]), 1)])
+    return ["run", "steps", *names, "CPU s"], table
