@@ -7,7 +7,7 @@ import numpy as np
 from fsiwork.bodies import laws
 from fsiwork.bodies.body import Body
 from fsiwork.bodies.bubbles import Bubbles
-from fsiwork.bodies.curve import Curve, ring
+from fsiwork.bodies.curve import Curve, fibre, ring
 from fsiwork.bodies.interface import Interface
 from fsiwork.bodies.markers import Markers, outline
 from fsiwork.bodies.membrane import Membrane
@@ -109,12 +109,17 @@ def _markers(spec, grid: Grid, edges: Edges) -> Markers:
 
 
 def _curve(spec, grid: Grid, edges: Edges) -> Curve:
+    line, eps = spec.shape, spec.width.of(grid.h)
+    if line.kind == "ring":
+        levels = ring(line.centre, line.radius, "xyz".index(line.normal), spec.stretch)
+    else:
+        levels = fibre(line.root, line.length, "xyz".index(line.along), spec.stretch, eps)
     return Curve(
         grid,
         edges,
-        ring(spec.shape.centre, spec.shape.radius, "xyz".index(spec.shape.normal), spec.stretch),
+        levels,
         _law(spec.energy),
-        spec.width.of(grid.h),
+        eps,
         transport=_transport(spec.transport, grid, edges, 2),
         carry=spec.transport.carry,
         coupling=spec.coupling,

@@ -129,7 +129,12 @@ def _variable(scene: Scene) -> bool:
 def _carried(body: Body, dim: int) -> int:
     if isinstance(body, Markers):
         return 0
-    return (2 if isinstance(body, Curve) else 1) + dim * (body.transport.carry == "map")
+    return _levels(body) + dim * (body.transport.carry == "map")
+
+
+def _levels(body: Body) -> int:
+    """How many level sets: two meet in a curve, a label ends a fibre."""
+    return 2 + (body.shape.kind == "fibre") if isinstance(body, Curve) else 1
 
 
 def _fields(scene: Scene) -> list[tuple[str, int]]:
@@ -210,7 +215,7 @@ def _stages(scene: Scene, solvers) -> list[tuple[str, float]]:
     for body in scene.bodies:
         if isinstance(body, Markers):
             continue
-        mapped, fields = body.transport.carry == "map", 2 if isinstance(body, Curve) else 1
+        mapped, fields = body.transport.carry == "map", _levels(body)
         found.append(("transport of a field", float(scene.box.dim if mapped else fields)))
         if mapped:
             found.append(("φ from the map", 1.0))

@@ -32,7 +32,7 @@ from fsiwork.specs.bodies import (
 from fsiwork.specs.box import Box, Edges, FreeSlip, Inflow, NoSlip, Outflow, Periodic, Side, Wall
 from fsiwork.specs.faults import Fault, got, wording, wrong
 from fsiwork.specs.fluid import Fluid, Inside, Rest, Shear, TaylorGreen
-from fsiwork.specs.lines import Ring
+from fsiwork.specs.lines import Fibre, Ring
 from fsiwork.specs.motion import Deformation, Motion, Rotation, Translation, Vortex
 from fsiwork.specs.shapes import (
     Ball,
@@ -53,11 +53,11 @@ from fsiwork.specs.yaml import Loader
 
 __all__ = [
     "Ball", "Block", "Body", "Box", "Bubble", "Bubbles", "Capsule", "Cassini", "Clock", "Curve", "Deformation",
-    "Edges", "Ellipsoid", "Energy", "Fluid", "FreeSlip", "Inflow", "Inside", "Interface", "Intersection", "Law",
-    "Linear", "Markers", "Membrane", "Minus", "Motion", "Moved", "NoSlip", "Outflow", "Output", "Periodic", "Polygon",
-    "Quadratic", "Redistance", "Rest", "Ring", "Rotation", "Scene", "SceneError", "Shape", "Shear", "ShearMembrane",
-    "Side", "Slot", "TaylorGreen", "Torus", "Translation", "Transport", "Union", "Vortex", "Wall", "Width", "faults",
-    "load", "loads",
+    "Edges", "Ellipsoid", "Energy", "Fibre", "Fluid", "FreeSlip", "Inflow", "Inside", "Interface", "Intersection",
+    "Law", "Linear", "Markers", "Membrane", "Minus", "Motion", "Moved", "NoSlip", "Outflow", "Output", "Periodic",
+    "Polygon", "Quadratic", "Redistance", "Rest", "Ring", "Rotation", "Scene", "SceneError", "Shape", "Shear",
+    "ShearMembrane", "Side", "Slot", "TaylorGreen", "Torus", "Translation", "Transport", "Union", "Vortex", "Wall",
+    "Width", "faults", "load", "loads",
 ]  # fmt: skip
 
 
@@ -171,7 +171,7 @@ class Scene(Spec):
         if isinstance(body, ShearMembrane):
             kinds = {side.kind for pair in self.box.sides for side in pair}
             yield from ((("bodies", i, *path), text) for path, text in body.misfits(self.box.dim, kinds))
-        if isinstance(body, Curve) and body.shape.normal in self._periodic:
+        if isinstance(body, Curve) and getattr(body.shape, "normal", "") in tuple(self._periodic):
             yield ("bodies", i, "shape", "normal"), "the ring must not lie across a periodic direction: φ¹ would jump"
         for where, shape in _shapes(body):
             misfits = list(shape.misfits(self.box.dim))
@@ -187,6 +187,16 @@ class Scene(Spec):
         if not width.of(h) >= h * (1 - 1e-9):
             knob = "length" if width.cells is None else "cells"
             yield ("bodies", i, "width", knob), f"ε = {width.of(h):.6g} is below the grid step {h:.6g}"
+        if isinstance(body, Curve) and isinstance(body.shape, Fibre) and self.box.dim == 3:
+            yield from ((("bodies", i, "width"), text) for text in self._crowded(body))
+
+    def _crowded(self, body: Curve) -> Iterator[str]:
+        """Levels jump at periodic sides; a label takes the jump away from the fibre, if there is room."""
+        room = 2.5 * body.width.of(self.box.h) / body.stretch**0.5
+        for a, x in enumerate("xyz"):
+            low = body.shape.root[a] - self.box.origin[a]
+            if x != body.shape.along and x in self._periodic and min(low, self.box.length[a] - low) < room:
+                yield f"the fibre needs {room:.6g} to either side along {x}"
 
     @sense
     def _fields_exist(self) -> Iterator[Fault]:

@@ -185,3 +185,23 @@ def ring(centre: tuple[float, ...], radius: float, axis: int, stretch: float) ->
         return scale * (x[axis] - centre[axis]), scale * (away - radius)
 
     return levels
+
+
+def fibre(root: tuple[float, ...], length: float, axis: int, stretch: float, eps: float) -> Levels:
+    """Levels of a straight line from ``root`` along ``axis`` [length], and χ that falls to 0 over the tube's half-width
+    around its end, and to the sides, 1.5 to 2.5 half-widths away, where levels may jump (periodic sides)."""
+    others, scale = [a for a in range(3) if a != axis], np.sqrt(stretch)
+    width = eps / scale
+
+    def fall(r):
+        return 0.5 * (1.0 + np.cos(np.pi * np.clip(r, 0.0, 1.0)))
+
+    def levels(*x):
+        p, q = (x[a] - root[a] for a in others)
+        return (
+            scale * p,
+            scale * q,
+            fall((x[axis] - root[axis] - length) / width + 0.5) * fall(np.hypot(p, q) / width - 1.5),
+        )
+
+    return levels

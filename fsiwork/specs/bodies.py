@@ -9,7 +9,7 @@ from pydantic_core import core_schema
 from fsiwork.specs.base import NotNegative, Number, Positive, Spec, one_of, sense, whole
 from fsiwork.specs.faults import Fault, got, wrong
 from fsiwork.specs.fluid import Inside
-from fsiwork.specs.lines import Ring
+from fsiwork.specs.lines import Fibre, Ring
 from fsiwork.specs.shapes import SHAPES, Ball, Shape
 
 
@@ -256,7 +256,7 @@ class Curve(Spec):
     """
 
     kind: Literal["curve"] = "curve"
-    shape: one_of(Ring)
+    shape: one_of(Ring, Fibre)
     stretch: Positive = 1.0
     energy: Energy
     width: Width

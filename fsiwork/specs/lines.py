@@ -1,4 +1,4 @@
-"""Curves in space as data: what an elastic ring is made along."""
+"""Curves in space as data: rings and fibres."""
 
 import math
 from collections.abc import Iterator
@@ -39,3 +39,24 @@ class Ring(Spec):
             x[(axis + 2) % 3] += self.radius * math.sin(angle)
             found.append(tuple(x))
         return found
+
+
+class Fibre(Spec):
+    """A straight line from its ``root``, ``length`` long ``along`` an axis; its end is free."""
+
+    kind: Literal["fibre"] = "fibre"
+    root: Vector
+    length: Positive
+    along: Literal["x", "y", "z"] = "y"
+
+    def misfits(self, dim: int) -> Iterator[Fault]:
+        """Fields that do not fit a box of ``dim`` directions."""
+        if dim != 3:
+            yield ("kind",), f"a fibre has 3 directions, the box {dim}"
+        elif len(self.root) != 3:
+            yield ("root",), f"must have 3 numbers, got {len(self.root)}"
+
+    def bounds(self, dim: int) -> tuple[tuple[float, float], ...]:
+        """(low, high) in each direction."""
+        axis = "xyz".index(self.along)
+        return tuple((c, c + self.length * (a == axis)) for a, c in enumerate(self.root))
