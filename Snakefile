@@ -11,7 +11,7 @@ from shlex import quote
 
 from snakemake.utils import min_version
 
-from fsiwork.provenance import source_hash
+from fsiwork.sources import source_hash
 from fsiwork.targets import Plan
 
 min_version("9.18")

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.rows import Row, row
-from fsiwork.provenance import source_hash
 from fsiwork.scene import Scene
 from fsiwork.simulate import frames
+from fsiwork.sources import source_hash
 
 SCRIPT = Path(__file__).with_name("membrane2d.edp")
 NAMES = ("FreeFem++-nw", "FreeFem++", "FreeFem++-mpi")

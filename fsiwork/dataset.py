@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fsiwork import layout, provenance
+from fsiwork import layout, provenance, sources
 from fsiwork.checkpoint import Store, need_space
 from fsiwork.joining import axis_names, join, tabulate
 from fsiwork.layout import VARIABLES
@@ -27,7 +27,7 @@ BOOK = (
 )
 
 
-sources = cache(provenance.source_hash)  # of the code that this process has loaded, not of later edits
+loaded = cache(sources.source_hash)  # of the code that this process has loaded, not of later edits
 
 
 def write(
@@ -55,7 +55,7 @@ def write(
     fsiwork.checkpoint.DiskFull, fsiwork.checkpoint.Damaged, RuntimeError (another process writes the same run).
     """
     path = Path(path)
-    identity = {"scene": provenance.scene_id(layout.plain(scene)), "source": sources()}
+    identity = {"scene": sources.scene_id(layout.plain(scene)), "source": loaded()}
     store = Store(path, identity, resume)
     keep = True
     try:
@@ -141,7 +141,7 @@ def _assemble(store: Store, scene, path: Path, attributes: dict[str, str]) -> No
 
 def _attributes(scene, identity: dict[str, str], ended: str) -> dict[str, str]:
     data = layout.plain(scene)
-    installed = provenance.versions()
+    installed = sources.versions()
     return {
         "Conventions": CONVENTIONS,
         "title": data.get("title") or "Level-set fluid-structure interaction",

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fsiwork import provenance
+from fsiwork import sources
 from fsiwork.layout import VARIABLES, described
 from fsiwork.netcdf import Writer, opened, written
 
@@ -230,8 +230,8 @@ def tabulate(
         dims = (f"{name}_i",) if any(np.ndim(q) for q in found) else ()
         plan.grow(dict.fromkeys(dims, long))
         plan.variables[name] = Shape(dims, np.dtype("f8"), described(name))
-    words = {"source": f"fsiwork {provenance.versions()['fsiwork']}", "source_hash": provenance.source_hash()}
-    words |= {"versions": json.dumps(provenance.versions()), "ended": "complete", **(attributes or {})}
+    words = {"source": f"fsiwork {sources.versions()['fsiwork']}", "source_hash": sources.source_hash()}
+    words |= {"versions": json.dumps(sources.versions()), "ended": "complete", **(attributes or {})}
     with written(Path(out), _titled(words), _bytes(plan, len(results))) as writer:
         _declare(writer, plan, {})
         _words(writer, plan, {name: [result.get(name, "") for result in results] for name in texts})

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fsiwork import layout, provenance, running
+from fsiwork import layout, provenance, running, sources
 from fsiwork.dataset import BOOK, CONVENTIONS
 from fsiwork.netcdf import Writer, written
 
@@ -74,7 +74,7 @@ def to_file(image: str | Path, path: str | Path, smoothing: float = 2.5, start: 
 
 
 def _attributes(image: str | Path, found: "Segmentation", smoothing: float, start: str) -> dict:
-    installed = provenance.versions()
+    installed = sources.versions()
     return {
         "Conventions": CONVENTIONS,
         "title": f"Segmentation of {Path(image).name}",
@@ -87,7 +87,7 @@ def _attributes(image: str | Path, found: "Segmentation", smoothing: float, star
         "level_inside": found.inside,
         "level_outside": found.outside,
         "steps": found.steps,
-        "source_hash": provenance.source_hash("core", "segmenting"),
+        "source_hash": sources.source_hash("core", "segmenting"),
         "ended": found.ended,
     }
 

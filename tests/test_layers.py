@@ -15,12 +15,12 @@ LEVEL = {
     "bodies": 1,
     "specs": 2, "scene": 2, "targets": 2, "build": 2, "simulate": 2, "plan": 2,
     "layout": 3, "checkpoint": 3, "contour": 3, "netcdf": 3, "dataset": 3, "joining": 3, "export": 3,
-    "provenance": 0,  # standard library only, so that everybody may say where a number comes from
+    "sources": 0, "provenance": 0,  # standard library only, so that everybody may say where a number comes from
     "running": 4, "segmenting": 4, "studies": 4, "figures": 4,
     "artefacts": 5, "__init__": 5, "__main__": 5,
 }  # fmt: skip
 DATA = {"specs", "scene", "targets"}  # what is simulated, as data: no arithmetic
-LIGHT = {"targets", "provenance"}
+LIGHT = {"targets", "provenance", "sources"}
 FORBIDDEN_NAMES = {"utils", "util", "helpers", "helper", "common", "misc", "tools"}
 
 
@@ -98,7 +98,7 @@ def test_rules_are_light():
     for path in (root / "Snakefile", *sorted((root / "rules").glob("*.smk"))):
         text = path.read_text(encoding="utf-8")
         used = re.findall(r"^(?:from|import) (fsiwork[\w.]*)", text, re.MULTILINE)
-        assert set(used) <= {"fsiwork.targets", "fsiwork.provenance"}, path
+        assert set(used) <= {"fsiwork.targets", "fsiwork.sources"}, path
         assert not re.search(r"^\s*run:", text, re.MULTILINE), f"{path}: no run: blocks"
 
 
@@ -107,7 +107,8 @@ def test_importing_targets_loads_nothing_heavy():
     import sys
 
     heavy = "('numba', 'xarray', 'numpy', 'matplotlib', 'pydantic', 'scipy')"
-    code = f"import sys, fsiwork.targets, fsiwork.provenance; print([m for m in {heavy} if m in sys.modules])"
+    light = "fsiwork.targets, fsiwork.provenance, fsiwork.sources"
+    code = f"import sys, {light}; print([m for m in {heavy} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from fsiwork import provenance
+from fsiwork import provenance, sources
 
-KERNELS = provenance.PACKAGE / "core" / "kernels"
+KERNELS = sources.PACKAGE / "core" / "kernels"
 SMALL = {
     "core/grid.py": 'def area(h):\n    """Area."""\n    return h * h\n',
     "bodies/body.py": "class Body:\n    pass\n",
@@ -34,7 +34,7 @@ def package(tmp_path, monkeypatch):
     for name, text in SMALL.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text)
-    monkeypatch.setattr(provenance, "PACKAGE", tmp_path)
+    monkeypatch.setattr(sources, "PACKAGE", tmp_path)
 
     def edited(name, old, new):
         text = (tmp_path / name).read_text()
@@ -44,7 +44,7 @@ def package(tmp_path, monkeypatch):
 
     def hashes():
         layers = [(), ("figures.chapter3:fig_1",), ("figures",)]
-        return tuple(provenance.source_hash(*layer) for layer in layers)
+        return tuple(sources.source_hash(*layer) for layer in layers)
 
     return edited, hashes()
 
@@ -68,23 +68,23 @@ def test_a_figure_changes_only_what_is_drawn(package):
 
 
 def test_versions_belong_to_the_hash_of_a_run(monkeypatch):
-    before = provenance.source_hash(), provenance.source_hash("dataset")
-    monkeypatch.setattr(provenance, "versions", lambda *_: {"numba": "0.0"})
-    assert provenance.source_hash() != before[0]
-    assert provenance.source_hash("dataset") == before[1]
+    before = sources.source_hash(), sources.source_hash("dataset")
+    monkeypatch.setattr(sources, "versions", lambda *_: {"numba": "0.0"})
+    assert sources.source_hash() != before[0]
+    assert sources.source_hash("dataset") == before[1]
 
 
 def test_unknown_layer_or_function_is_refused():
     with pytest.raises(FileNotFoundError, match="no layer 'cores'"):
-        provenance.source_hash("cores")
+        sources.source_hash("cores")
     with pytest.raises(FileNotFoundError, match="no function 'grow'"):
-        provenance.source_hash("provenance:grow")
+        sources.source_hash("provenance:grow")
 
 
 def test_the_hash_of_a_run_covers_all_that_a_run_imports():
-    root = provenance.PACKAGE
-    covered = {file for layer in provenance.RUN for file in provenance._files(layer)}
-    exempt = {root / "provenance.py", root / "joining.py"}  # words about a run, not its numbers
+    root = sources.PACKAGE
+    covered = {file for layer in sources.RUN for file in sources._files(layer)}
+    exempt = {root / "provenance.py", root / "sources.py", root / "joining.py"}  # words about a run, not its numbers
     waiting, seen = [root / "simulate.py", root / "dataset.py"], {root / "__init__.py"}  # it imports when asked
     while waiting:
         file = waiting.pop()
@@ -104,13 +104,13 @@ def test_the_hash_of_a_run_covers_all_that_a_run_imports():
 
 
 def test_scene_id_sees_values_not_their_order():
-    assert provenance.scene_id('{"a": 1, "b": [2]}') == provenance.scene_id({"b": [2], "a": 1})
-    assert provenance.scene_id({"a": 1}) != provenance.scene_id({"a": 2})
+    assert sources.scene_id('{"a": 1, "b": [2]}') == sources.scene_id({"b": [2], "a": 1})
+    assert sources.scene_id({"a": 1}) != sources.scene_id({"a": 2})
 
 
 def test_light_import():
     look = "sorted({'numpy', 'numba', 'xarray'} & set(sys.modules))"
-    code = f"import sys, fsiwork.provenance as p; p.source_hash(); print({look})"
+    code = f"import sys, fsiwork.provenance, fsiwork.sources as p; p.source_hash(); print({look})"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
 
 
@@ -123,9 +123,9 @@ def test_hashes_kept_on_disk_are_those_of_the_sources(tmp_path, damage):
         (package / name).write_text(SMALL[name])
     code = f"""
         from pathlib import Path
-        from fsiwork import provenance
-        provenance.PACKAGE = Path({str(package)!r})
-        print(provenance.source_hash("scene"))
+        from fsiwork import sources
+        sources.PACKAGE = Path({str(package)!r})
+        print(sources.source_hash("scene"))
         """
     kept = package.parent / ".cache" / f"sources-{platform.python_version()}.json"
     (package.parent / "pyproject.toml").touch()
@@ -153,14 +153,14 @@ def test_prepare_sets_threads_and_an_own_cache():
         print(numba.config.NUMBA_NUM_THREADS, numba.config.CACHE_DIR == str(folder), folder.name)
         """
     done = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["1", "True", provenance.source_hash(*provenance.shared(KERNELS))]
+    assert done.stdout.split() == ["1", "True", sources.source_hash(*sources.shared(KERNELS))]
 
 
 def test_every_kernel_that_another_file_calls_counts_for_the_cache():
     """A jitted function used outside its file must be in a `shared` one, or an edit of it would go unnoticed."""
-    names = provenance.shared(KERNELS)
+    names = sources.shared(KERNELS)
     assert {"core.kernels.__init__", "core.kernels.membrane"} <= set(names)
-    for file in provenance.PACKAGE.rglob("*.py"):
+    for file in sources.PACKAGE.rglob("*.py"):
         tree = ast.parse(file.read_text(encoding="utf-8"))
         jitted = any(
             isinstance(node, ast.FunctionDef) and {"loop", "point", "njit"} & _decorators(node) for node in tree.body

@@ -182,9 +182,9 @@ def test_nothing_is_made_twice_and_a_deleted_dataset_is_noticed(book):
 
 def test_a_changed_solver_makes_every_run_again(book, tmp_path):
     (tmp_path / "sitecustomize.py").write_text(
-        "from fsiwork import provenance\n"
-        "before = provenance.source_hash\n"
-        "provenance.source_hash = lambda *layers: before(*layers) + 'x'\n"
+        "from fsiwork import sources\n"
+        "before = sources.source_hash\n"
+        "sources.source_hash = lambda *layers: before(*layers) + 'x'\n"
     )
     again = snakemake(book, "--dry-run", path=[tmp_path])
     said = again.stdout + again.stderr

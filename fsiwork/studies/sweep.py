@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fsiwork import joining, provenance, scene
+from fsiwork import joining, provenance, scene, sources
 from fsiwork.checkpoint import replacing
 from fsiwork.dataset import open_run, open_study, write
 from fsiwork.simulate import frames
@@ -87,7 +87,7 @@ def warm(scenes: Iterable[tuple[Path, dict[str, Any]]]) -> int:
     done = set()
     for path, overrides in scenes:
         small = scene.load(path, {**overrides, "box.cells": WARM_CELLS, "clock.step": 1e-4, "clock.end": 2e-4})
-        key = provenance.scene_id(small.model_dump_json())
+        key = sources.scene_id(small.model_dump_json())
         if key not in done:
             done.add(key)
             for _ in frames(small):

@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from fsiwork.provenance import source_hash
+from fsiwork.sources import source_hash
 from fsiwork.targets.book import Entry, load_book
 from fsiwork.targets.reading import SIZES, Faults
 from fsiwork.targets.studies import Point, Study, load_study
