@@ -139,6 +139,7 @@ def _shear_membrane(spec, grid: Grid, edges: Edges) -> ShearMembrane:
         volume=spec.volume,
         twist=spec.twist,
         inflation=spec.inflation,
+        alike=spec.alike,
     )
 
 

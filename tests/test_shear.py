@@ -121,6 +121,19 @@ def test_the_prestress_is_that_of_the_book():
     assert body.survey()[kernels.AREA] == pytest.approx(np.pi, rel=0.01)
 
 
+def test_all_layers_may_be_strained_alike():
+    """Z₂ depends on the direction alone, and is that of (3.67) on the sphere."""
+    body, _ = sphere(48, eps=0.1, twist=1.0, alike=True)
+    g = body.grid
+    r = np.sqrt(np.broadcast_to(sum(q**2 for q in g.points()), g.shape)).ravel()
+    nodes = np.flatnonzero((r > 0.35) & (r < 0.65))
+    z = np.broadcast_to(g.points()[2], g.shape).ravel()[nodes]
+    Z1, Z2 = area_and_shear(map_gradient(g, body.map.Y, nodes), np.stack([q[nodes] for q in body.map.Y], axis=1))
+    assert np.abs(Z1 - 1).max() < 1e-3
+    wanted = 2 * (0.25 - (0.5 * z / r[nodes]) ** 2) ** 2
+    assert np.abs(Z2 - 1 - wanted).max() < 1e-3
+
+
 def test_a_resting_sphere_stays():
     body, flow = sphere(20, eps=0.2)
     for _ in range(5):

@@ -40,6 +40,8 @@ class ShearMembrane(Body):
     eps : half-width ε of the plain D_ε, in lengths at rest
     twist : t₀ of (3.67) [angle/length], about the axis through the centre along z
     inflation : radius at t = 0 over that at rest; J₀ is its cube
+    alike : twist by t₀ radius z/|x| in place of t₀ z: the same on the sphere, and all layers of the band are then
+        strained as the sphere is; with (3.67) itself those outside are strained more
 
     Attributes
     ----------
@@ -52,7 +54,7 @@ class ShearMembrane(Body):
 
     def __init__(
         self, grid: Grid, edges: Edges, centre, radius: float, law: str, area: float, shear: float, eps: float,
-        *, volume: float = 0.0, twist: float = 0.0, inflation: float = 1.0,
+        *, volume: float = 0.0, twist: float = 0.0, inflation: float = 1.0, alike: bool = False,
     ):  # fmt: skip
         if grid.dim != 3:
             raise ValueError(f"a membrane with shear needs three directions, got {grid.dim}")
@@ -68,7 +70,7 @@ class ShearMembrane(Body):
         self._period = np.array([grid.length[a] if edges.periodic(a) else 0.0 for a in grid.axes])
         self.map = BackwardMap(grid, edges, Transport(grid, edges, "upwind5", centring=2))
         if twist or inflation != 1.0:
-            self._strain(float(twist))
+            self._strain(float(twist), float(radius) if alike else 0.0)
         self._plan()
 
     # --- verbs ------------------------------------------------------------------------------------------------
@@ -156,11 +158,12 @@ class ShearMembrane(Body):
         return self._values
 
     # --- parts ------------------------------------------------------------------------------------------------
-    def _strain(self, twist: float) -> None:
-        """Y(x, 0) by (3.67), over the inflation."""
+    def _strain(self, twist: float, radius: float) -> None:
+        """Y(x, 0) by (3.67), over the inflation; with a ``radius`` all layers alike."""
         x, y, z = self.grid.points()
         x, y, z = (q - c for q, c in zip((x, y, z), self._centre, strict=True))
-        cos, sin = np.cos(twist * z), np.sin(twist * z)
+        height = radius * z / np.sqrt(np.maximum(x**2 + y**2 + z**2, kernels.TINY)) if radius else z
+        cos, sin = np.cos(twist * height), np.sin(twist * height)
         for q, c, values in zip(self.map.Y, self._centre, (x * cos + y * sin, y * cos - x * sin, z), strict=True):
             self.grid.padded(q)[...] = c + values / self.inflation
 

@@ -14,7 +14,7 @@ AZIMUTH, ELEVATION = np.radians(30), np.radians(22)
 LOOK = dict(
     zip(shear.GRIDS, ((style.OKABE_ITO[5], ":"), (style.OKABE_ITO[1], "--"), (style.OKABE_ITO[0], "-")), strict=True)
 )
-PLAIN = {"color": style.OKABE_ITO[3], "linestyle": "-.", "label": "N = 48, κ = 0"}
+PLAIN = {"color": style.OKABE_ITO[3], "linestyle": "-.", "label": "N = 32, κ = 0"}
 
 
 def _globe(ax, markers: np.ndarray, speed: np.ndarray | None = None, top: float = 1.0):
@@ -94,23 +94,24 @@ def fig_3_18(datasets: Mapping[str, xr.Dataset], measured: Mapping[str, float]) 
 
 
 def sphere_inflated(datasets: Mapping[str, xr.Dataset], measured: Mapping[str, float]) -> Figure:
-    """Left: radii along x and z over time; right: mean of Z₂ − 1 on the surface, for both laws."""
+    """Left: radii along x and z over time; right: mean of Z₂ − 1 on the surface; for both laws, and for (3.67) as it is
+    printed."""
     data = datasets["inflated_sphere"]
-    figure, (left, right) = style.sheet(1, 2, size=(9.0, 3.8))
-    names = {"quadratic": "E₂′ = λ₂(Z₂ − 1)", "linear": "E₂′ = λ₂"}
-    for k, case in enumerate(data["case"].values):
+    figure, (left, right) = style.sheet(1, 2, size=(9.6, 3.9))
+    names = {"quadratic": "E₂′ = λ₂(Z₂ − 1)", "linear": "E₂′ = λ₂", "printed": "E₂′ = λ₂(Z₂ − 1), layers by (3.67)"}
+    for k, (case, name) in enumerate(names.items()):
         one, colour = data.sel(case=case), style.OKABE_ITO[k]
-        label = f"{names[str(case)]}; largest |r − 0.5|/0.5 at the end {100 * measured[f'away_{case}']:.2g} %"
-        left.plot(one["t"], one["axis_z"], color=colour, label=f"z, {names[str(case)]}")
-        left.plot(one["t"], one["axis_x"], "--", color=colour, label=f"x, {names[str(case)]}")
-        right.semilogy(one["t"], one["shear_mean"], "-" if k == 0 else "--", color=colour, label=label)
-        right.axhline(0.1 * float(one["shear_mean"][0]) if k == 0 else 0.01, color=colour, linewidth=0.8, linestyle=":")
+        label = f"{name}, N = {int(one['n_cells'])}: {100 * measured[f'away_{case}']:.2g} % from the sphere"
+        left.plot(one["t"], one["axis_z"], color=colour, label=f"{name}, z and dashed x")
+        left.plot(one["t"], one["axis_x"], "--", color=colour, linewidth=1.0)
+        right.semilogy(one["t"], one["shear_mean"], ("-", "--", ":")[k], color=colour, label=label)
+    for level in (0.1 * float(data["shear_mean"].sel(case="quadratic")[0]), 0.01):
+        right.axhline(level, **style.REFERENCE)
     style.band(left, 0.5, 0.01)
     left.set(xlabel="time t [T]", ylabel="half-axes [L]")
-    right.set(xlabel="time t [T]", ylabel="mean of Z₂ − 1 [1]; dotted: asked for at the end")
+    right.set(xlabel="time t [T]", ylabel="mean of Z₂ − 1 [1]", ylim=(None, 3))
     left.legend(fontsize=7)
     right.legend(fontsize=7)
-    style.note(
-        figure, datasets, f"ε = {float(data['eps'][0]):g} at rest, radius 1.1 × that at rest, walls, μ = 0.01, κ = 10"
-    )
+    eps = " and ".join(f"{q:g}" for q in sorted(set(data["eps"].values)))
+    style.note(figure, datasets, f"ε = {eps} at rest, radius 1.1 × that at rest, walls, μ = 0.01, κ = 10")
     return figure

@@ -274,7 +274,8 @@ class ShearMembrane(Spec):
 
     ``law``: quadratic (3.65), linear (E₂' = λ₂), neo-hookean or skalak, see `fsiwork.bodies.shear`; ``area`` and
     ``shear`` are λ₁ and λ₂, ``volume`` a modulus that holds det ∇Y. The shape is that at t = 0,
-    ``inflation`` its radius over that at rest, ``twist`` t₀ of (3.67).
+    ``inflation`` its radius over that at rest, ``twist`` t₀ of (3.67),
+    which ``alike`` continues off the sphere so that all layers of the band are strained alike.
     """
 
     stretch: ClassVar = 1.0
@@ -290,6 +291,7 @@ class ShearMembrane(Spec):
     width: Width
     twist: Number = 0.0
     inflation: Positive = 1.0
+    alike: bool = False
 
     @sense
     def _law_fits(self) -> Iterator[Fault]:
