@@ -14,7 +14,7 @@ AZIMUTH, ELEVATION = np.radians(30), np.radians(22)
 LOOK = dict(
     zip(shear.GRIDS, ((style.OKABE_ITO[5], ":"), (style.OKABE_ITO[1], "--"), (style.OKABE_ITO[0], "-")), strict=True)
 )
-PLAIN = {"color": style.OKABE_ITO[3], "linestyle": "-.", "label": "N = 32, κ = 0"}
+HELD = {"color": style.OKABE_ITO[3], "linestyle": "-.", "label": "N = 32, κ = 10"}
 
 
 def _globe(ax, markers: np.ndarray, speed: np.ndarray | None = None, top: float = 1.0):
@@ -55,8 +55,8 @@ def _history(ax, data: xr.Dataset, name: str, label: str) -> None:
     for case, (colour, dashes) in LOOK.items():
         one = data.sel(case=case)
         ax.plot(one["t"], one[name], color=colour, linestyle=dashes, label=f"N = {case[1:]}")
-    one = data.sel(case="plain")
-    ax.plot(one["t"], one[name], linewidth=1.0, **PLAIN)
+    one = data.sel(case="held")
+    ax.plot(one["t"], one[name], linewidth=1.0, **HELD)
     ax.set(xlabel="time t [T]", ylabel=label, xlim=(0, None))
 
 
@@ -89,7 +89,7 @@ def fig_3_18(datasets: Mapping[str, xr.Dataset], measured: Mapping[str, float]) 
     below[2].axhline(0.1, **style.REFERENCE)
     below[2].set_ylim(0, None)
     eps = float(data["eps"][0])
-    style.note(figure, datasets, f"ε = {eps:g} in length, walls, μ = 0.01, λ₁ = λ₂ = 1, κ = 10; globes: finest grid")
+    style.note(figure, datasets, f"ε = {eps:g} in length, walls, μ = 0.01, λ₁ = λ₂ = 1; globes: finest grid")
     return figure
 
 
