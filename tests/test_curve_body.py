@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from fsiwork.bodies.curve import Curve, ring
 from fsiwork.bodies.laws import Linear, Quadratic
@@ -12,7 +13,9 @@ from fsiwork.core.grid import Grid
 from fsiwork.core.integrals import line_integral
 from fsiwork.core.transport import Transport
 from fsiwork.scene import SceneError, loads
-from fsiwork.simulate import step
+from fsiwork.simulate import build, step
+from fsiwork.studies import rings
+from fsiwork.studies.fibres import PLACES, trace
 
 CENTRE = (1.03, 0.97, 1.02)
 SCENE = """
@@ -180,3 +183,51 @@ def test_scenes_of_rings():
         loads(
             SCENE, {"bodies.0": {**markers["bodies.0"], "shape": {"kind": "ball", "centre": [1, 1, 1], "radius": 0.5}}}
         )
+
+
+FIBRE = {"box": {"length": [2, 1, 1], "cells": 32, "edges": {"x": "periodic", "y": "no-slip", "z": "periodic"}},
+         "bodies.0.shape": {"kind": "fibre", "root": [1, 0, 0.5], "length": 0.5, "along": "y"}, "bodies.0.stretch": 1.0,
+         "bodies.0.width": {"length": 0.125}, "bodies.0.transport": {"carry": "map", "scheme": "upwind5"}}  # fmt: skip
+
+
+def test_a_fibre_ends_and_its_labels_are_found():
+    sim = build(loads(SCENE, FIBRE))
+    assert sim.gauges()["length"] == pytest.approx(0.5, rel=1e-3)
+    x, y = trace(sim)
+    assert np.abs(x - 1.0).max() < 1e-12
+    assert y == pytest.approx(np.linspace(0.0, 0.5, PLACES), abs=1e-12)
+    Y, g = sim.bodies[0].map.Y, sim.flow.grid
+    g.padded(Y[0])[...] -= 0.3 * g.points()[1] ** 2  # sheared: x = 1 + 0.3 y²
+    x, y = trace(sim)
+    assert x == pytest.approx(1.0 + 0.3 * y**2, abs=1e-9)
+
+
+def test_a_fibre_needs_room():
+    with pytest.raises(SceneError, match=r"the fibre needs 0\.5 to either side along z"):
+        loads(SCENE, FIBRE | {"bodies.0.width": {"length": 0.2}, "bodies.0.shape.root": [1, 0, 0.4]})
+    with pytest.raises(SceneError, match=r"bodies\.0\.shape: leaves the box along y"):
+        loads(SCENE, FIBRE | {"bodies.0.shape.length": 1.2})
+
+
+def test_measures_of_a_ring_that_follows_its_markers():
+    """A gap of one percent is found as such, and Z₃ that is the length's."""
+    t = np.linspace(0.0, 1.0, 5)
+    names = [f"{way}_{s:g}" for s in rings.STRETCHES for way in ("field", "map", "markers")] + ["fixed_1.25"]
+    cells, columns = [32, 64], ("radius", "length", "stretch", "mean_stretch", "kinetic_energy", "elastic_energy")
+    data = {name: np.zeros((len(names), 2, 5)) for name in columns}
+    for i, name in enumerate(names):
+        way, s = name.split("_")
+        for k, n in enumerate(cells):
+            error = 0.0 if way == "markers" else 0.01 * (32 / n) ** 2
+            radius = 0.4 * (float(s) + (1 - float(s)) * t)
+            data["radius"][i, k] = radius * (1 - error * t)
+            data["length"][i, k] = 2 * np.pi * data["radius"][i, k]
+            data["stretch"][i, k] = data["mean_stretch"][i, k] = radius / 0.4
+            data["elastic_energy"][i, k] = 1 - t
+    made = xr.Dataset({k: (("case", "cells", "row"), q) for k, q in data.items()}, {"case": names, "cells": cells})
+    found = rings.measure({"curve_ring": made})
+    assert found["gap_field_1.25_32"] == pytest.approx(1.0)
+    assert found["gap_1.5"] == pytest.approx(0.25)
+    assert found["of_change_1.25"] == pytest.approx(0.25 * 0.4 / 0.1, rel=1e-6)
+    assert found["z3_order"] == pytest.approx(2.0, abs=0.02)
+    assert found["made_1.25"] == 0.0

@@ -71,7 +71,8 @@ def trace(sim: Simulation) -> tuple[np.ndarray, np.ndarray]:
 
 def measure(datasets: Mapping[str, xr.Dataset]) -> dict[str, float]:
     """By case: largest change of the length by labels and of the integral over the tube, percent of the first; place of
-    the end at last, and the angle of the straight line from root to end to the flow [degrees]; largest velocity."""
+    the end at last, and the angle to the flow of the straight line from the root's place to it [degrees]; how far
+    label 0 slid along the wall, which holds it by u = 0 alone; largest velocity."""
     data, out = datasets["curve_fibre"], {}
     for case in CASES:
         one = data.sel(case=case)
@@ -80,6 +81,7 @@ def measure(datasets: Mapping[str, xr.Dataset]) -> dict[str, float]:
             out[f"{name}_{case}"] = float(100 * np.abs(q / q[0] - 1).max())
         x, y = paths(data, case)
         out[f"end_x_{case}"], out[f"end_y_{case}"] = float(x[-1, -1] - x[0, 0]), float(y[-1, -1])
+        out[f"root_{case}"] = float(np.abs(x[:, 0] - x[0, 0]).max())
         out[f"angle_{case}"] = float(np.degrees(np.arctan2(y[-1, -1], x[-1, -1] - x[0, 0])))
         out[f"speed_{case}"] = float(one["speed"].max(skipna=False))
     return out
@@ -93,6 +95,14 @@ def paths(data: xr.Dataset, case: str) -> tuple[np.ndarray, np.ndarray]:
 
 def rows(datasets: Mapping[str, xr.Dataset], measured: Mapping[str, float]) -> tuple[list[str], list[list]]:
     """A row for each stiffness."""
-    names = ("length", "smeared", "end_x", "end_y", "angle")
-    header = ["fibre", "length by labels, %", "by the integral, %", "end x − root", "end y", "angle, degrees"]
+    names = ("length", "smeared", "end_x", "end_y", "angle", "root")
+    header = [
+        "fibre",
+        "length by labels, %",
+        "by the integral, %",
+        "end x − root",
+        "end y",
+        "angle, degrees",
+        "root slid",
+    ]
     return header, [[case, *(float(f"{measured[f'{name}_{case}']:.4g}") for name in names)] for case in CASES]
