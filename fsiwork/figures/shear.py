@@ -36,7 +36,11 @@ def _globe(ax, markers: np.ndarray, speed: np.ndarray | None = None, top: float 
         values = speed.reshape(-1, shear.AROUND)
         colours = style.SEQUENTIAL(np.clip(0.5 * (values[:, :-1] + values[:, 1:]).ravel() / top, 0, 1))
     colours[:, 3] = np.where(depth > 0, 0.9, 0.1)
-    ax.add_collection(LineCollection(pieces[np.argsort(depth)], colors=colours[np.argsort(depth)], linewidths=0.8))
+    ax.add_collection(
+        LineCollection(
+            pieces[np.argsort(depth)], colors=colours[np.argsort(depth)], linewidths=0.8 if speed is None else 1.3
+        )
+    )
     ax.set(xlim=(-0.62, 0.62), ylim=(-0.62, 0.62), aspect="equal")
     ax.axis("off")
 
@@ -64,8 +68,8 @@ def fig_3_18(datasets: Mapping[str, xr.Dataset], measured: Mapping[str, float]) 
     """Above: markers on the sphere, at t = 0.5 coloured by speed; then radius along z, pressure on the axes; below:
     both norms (3.68) and the least det ∇Y so far."""
     data = datasets["sheared_sphere"]
-    figure = Figure(figsize=(10.0, 8.6))
-    rows = figure.add_gridspec(3, 1, height_ratios=(0.75, 1, 1))
+    figure = Figure(figsize=(10.0, 8.2))
+    rows = figure.add_gridspec(3, 1, height_ratios=(0.6, 1, 1))
     _globes(figure, rows[0].subgridspec(1, len(shear.SHOTS), wspace=0.02), data.sel(case=shear.GRIDS[-1]))
     radius, *pressures = (figure.add_subplot(place) for place in rows[1].subgridspec(1, 3))
     _history(radius, data, "axis_z", "half-axis along z [L]")
@@ -77,11 +81,8 @@ def fig_3_18(datasets: Mapping[str, xr.Dataset], measured: Mapping[str, float]) 
                 p = data.sel(case=case)[f"p_{axis}_{k}"]
                 label = f"t = {t:g}" if case == shear.GRIDS[-1] else None
                 ax.plot(shear.STATIONS, p, color=colour, linestyle=dashes, linewidth=0.8 + 0.9 * k, label=label)
-        ax.set(
-            xlabel=f"{axis} [L]",
-            ylabel="pressure p [M/(L T²)]",
-            title=f"on the {axis} axis: thin t = 0.1, thick t = 1.2",
-        )
+        ax.set(xlabel=f"{axis} [L]", ylabel="pressure p [M/(L T²)]")
+        ax.set_title(f"on the {axis} axis: thin t = 0.1, thick t = 1.2", fontsize=8)
     below = [figure.add_subplot(place) for place in rows[2].subgridspec(1, 3)]
     _history(below[0], data, "rms_box", "RMS of det ∇Y − 1 in the box [1]")
     _history(below[1], data, "rms_surface", "RMS of det ∇Y − 1 at the surface [1]")

@@ -138,7 +138,7 @@ def rise(r: np.ndarray, share: np.ndarray) -> float:
         r[k] + (share[k] - c) / (share[k] - share[k + 1]) * (r[k + 1] - r[k])
         for c, k in ((0.9, high[-1]), (0.1, low[0] - 1))
     ]
-    return float(ends[1] - ends[0])
+    return float(abs(ends[1] - ends[0]))
 
 
 def smeared(p: np.ndarray, phi: np.ndarray, eps: float) -> tuple[float, float]:
