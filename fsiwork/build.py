@@ -83,7 +83,8 @@ def _bubbles(spec, grid: Grid, edges: Edges) -> Bubbles:
 
 
 def _transport(spec, grid: Grid, edges: Edges, centring: int) -> Transport:
-    return Transport(grid, edges, spec.scheme, spec.tableau, np.dtype(spec.dtype), centring, band=spec.band)
+    own = {"band": spec.band, "from_interface": spec.from_interface}
+    return Transport(grid, edges, spec.scheme, spec.tableau, np.dtype(spec.dtype), centring, **own)
 
 
 def _interface(spec, grid: Grid, edges: Edges) -> Interface:
@@ -92,7 +93,7 @@ def _interface(spec, grid: Grid, edges: Edges) -> Interface:
         grid,
         edges,
         shape(spec.shape).distance,
-        transport=_transport(spec.transport, grid, edges, 4),
+        transport=_transport(spec.transport, grid, edges, 2 if spec.transport.from_interface else 4),
         carry=spec.transport.carry,
         redistance=functools.partial(redistance, method=anew.method) if anew else None,
         every=anew.every if anew else 1,

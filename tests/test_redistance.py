@@ -32,7 +32,7 @@ CASES = {
     # the grid joins them by a neck of two cells
     "two discs that touch": (Union((Ball((-0.2, 0.0), 0.2), Ball((0.2, 0.0), 0.2))).distance, lambda d, g: d, 1.6),
     "through nodes": (lambda x, y: x + 0.5 * H + 0 * y, lambda d, g: 3.0 * d, 1e-6),
-    "two interfaces in a cell": (slab(1.3 * H), lambda d, g: d, 0.75),
+    "two interfaces a cell apart": (slab(1.3 * H), lambda d, g: d, 0.75),
     "smaller than two cells": (Ball((0.4 * H, 0.5 * H), 0.9 * H).distance, lambda d, g: d, 0.75),
     "steep and shallow": (DISC, lambda d, g: d * (0.1 + 4 * (g.sample(lambda x, y: x + y) + 1.1) ** 2), 0.4),
 }
@@ -173,3 +173,14 @@ def test_a_wrong_method_and_band_are_one_line():
         redistance(grid, grid.field(), "pd")
     with pytest.raises(ValueError, match="band must be positive"):
         redistance(grid, grid.field(), "pde", 0.0)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_what_lies_between_two_nodes_is_not_seen(method):
+    """A slab of 0.6 cells with no node inside: φ has one sign, and every method answers as for an empty box."""
+    grid = square(32)
+    distance = grid.sample(slab(0.6 * H))
+    assert (distance > 0).all()
+    found = grid.inside(redistance(grid, distance, method))
+    assert np.isfinite(found).all()
+    assert (found > 0).all()

@@ -213,6 +213,16 @@ def test_a_scene_may_ask_for_a_band_of_an_interface_only():
     body = {"kind": "interface", "transport": {"scheme": "eno3", "band": 6}}
     found = parts(Scene.model_validate(scene(body)))[1][0].transport
     assert (found.scheme, found._pieces.band) == ("eno3", 6.0)
+    kept = Scene.model_validate(scene({"kind": "interface", "transport": {"from_interface": True}}))
+    assert len(parts(kept)[1][0].transport._ahead) == 2
+    for wrong in (
+        {"kind": "interface", "transport": {"from_interface": True, "carry": "map"}},
+        {"kind": "interface", "transport": {"from_interface": True, "scheme": "fromm"}},
+        {"kind": "membrane", "energy": {"kind": "linear", "stiffness": 1.0}, "width": {"cells": 3}}
+        | {"transport": {"from_interface": True}},
+    ):
+        with pytest.raises(ValueError, match="from_interface"):
+            Scene.model_validate(scene(wrong))
     for wrong in (
         {"kind": "interface", "transport": {"band": 2}},
         {"kind": "interface", "transport": {"band": 6, "carry": "map"}},

@@ -31,6 +31,8 @@ def named(name: str) -> Callable[[Grid, np.ndarray, float | None], np.ndarray]:
 def redistance(grid: Grid, phi: np.ndarray, method: str, band: float | None = None) -> np.ndarray:
     """A new field with the zero line and the signs of ``phi`` whose values are distances.
 
+    Zeros are seen by the signs of nodes: what lies between two nodes, thinner than a cell, is dropped.
+
     Parameters
     ----------
     phi : flat field at centres, shape ``(grid.size,)``, ghosts filled; any scale

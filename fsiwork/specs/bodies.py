@@ -89,7 +89,8 @@ class Width(Spec):
 class Transport(Spec):
     """How the interface is carried: φ itself (field) or the backward map Y with φ = φ₀(Y) (map).
 
-    ``band``: only so many cells on either side of it; φ is clipped beyond.
+    ``band``: only so many cells on either side of it; φ is clipped beyond. ``from_interface``: with the velocity of the
+    nearest point of the interface, which keeps a distance a distance (1.5.1).
     """
 
     scheme: Literal[
@@ -97,6 +98,7 @@ class Transport(Spec):
         "lax-wendroff", "beam-warming", "fromm", "semi-lagrangian",
     ] = "weno5"  # fmt: skip
     band: Annotated[float, Field(ge=3)] | None = None
+    from_interface: bool = False
     tableau: Literal["ssp-rk3", "ssp-rk2", "euler"] = "ssp-rk3"
     carry: Literal["field", "map"] = "field"
     dtype: Literal["float64", "float32"] = "float64"
@@ -105,6 +107,12 @@ class Transport(Spec):
     def _band_of_a_field(self) -> Iterator[Fault]:
         if self.band and self.carry == "map":
             yield ("band",), "is for carry: field; a map is needed everywhere"
+
+    @sense
+    def _interface_of_a_field(self) -> Iterator[Fault]:
+        staged = ("weno5", "weno-z", "upwind5", "upwind1", "centred", "eno2", "eno3")
+        if self.from_interface and (self.carry == "map" or self.scheme not in staged):
+            yield ("from_interface",), f"is for carry: field and a Runge-Kutta scheme, one of {', '.join(staged)}"
 
 
 class Membrane(Spec):
@@ -131,6 +139,8 @@ class Membrane(Spec):
     def _bending_fits(self) -> Iterator[Fault]:
         if self.transport.band:
             yield ("transport", "band"), "is for kind: interface; a membrane's |∇φ| is its stretch"
+        if self.transport.from_interface:
+            yield ("transport", "from_interface"), "is for bodies of kind interface"
         if self.bending and self.coupling == "iterated":
             yield ("coupling",), "with bending it must be explicit, semi-implicit or stabilised, got 'iterated'"
         if self.bending and self.coupling == "stabilised" and (self.inside or self.surface_mass):
@@ -198,6 +208,8 @@ class Bubbles(Spec):
             yield ("viscosity",), "bubbles with a buoyancy have the viscosity of the fluid"
         if self.transport.band:
             yield ("transport", "band"), "is for kind: interface"
+        if self.transport.from_interface:
+            yield ("transport", "from_interface"), "is for bodies of kind interface"
         for name in ("film", "keep_volume"):
             if getattr(self, name) and self.transport.carry == "map":
                 yield (name,), "needs transport.carry: field"
@@ -267,6 +279,8 @@ class Curve(Spec):
     def _whole_field(self) -> Iterator[Fault]:
         if self.transport.band:
             yield ("transport", "band"), "is for kind: interface; |∇φ¹ × ∇φ²| is the stretch of a curve"
+        if self.transport.from_interface:
+            yield ("transport", "from_interface"), "is for bodies of kind interface"
 
 
 class ShearMembrane(Spec):
