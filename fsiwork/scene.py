@@ -187,7 +187,7 @@ class Scene(Spec):
         if not width.of(h) >= h * (1 - 1e-9):
             knob = "length" if width.cells is None else "cells"
             yield ("bodies", i, "width", knob), f"ε = {width.of(h):.6g} is below the grid step {h:.6g}"
-        if isinstance(body, Curve) and isinstance(body.shape, Fibre) and self.box.dim == 3:
+        if isinstance(body, Curve) and isinstance(body.shape, Fibre) and not list(body.shape.misfits(self.box.dim)):
             yield from ((("bodies", i, "width"), text) for text in self._crowded(body))
 
     def _crowded(self, body: Curve) -> Iterator[str]:

@@ -59,6 +59,7 @@ def wording(found: dict) -> str:
     if kind in words:
         return f"{words[kind]}, got {got(value)}"
     for start, expected in (
+        ("bool", "true or false"),
         ("float", "a number"),
         ("int", "a whole number"),
         ("tuple", "a list"),
