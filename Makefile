@@ -33,9 +33,8 @@ test: $(READY)
 soak: $(READY)
 	FSIWORK_SOAK=200 $(BIN)/python -m pytest -n $(JOBS) tests/test_crash.py
 
-# A peer that cannot be built here is left out, and its rows say so.
+# A peer that is not installed is left out, and its rows say so.
 bench: $(READY)
-	-$(BIN)/python -m pip install --quiet --disable-pip-version-check scikit-fmm==2025.6.23
 	$(BIN)/python -m benchmarks -o results/benchmarks.json
 
 lint: $(READY)
