@@ -13,9 +13,9 @@ import numpy as np
 
 from fsiwork.core.grid import GHOSTS, Grid
 from fsiwork.core.kernels import closest_2d, closest_3d, rasters
+from fsiwork.core.relaxation import repeated
 
 BAND = 6.0  # cells
-SAME = 1e-6  # largest difference of wrapped ghosts from the cells they repeat, in parts of the largest value
 
 WEIGHTS = {p - 1: np.linalg.inv((np.arange(p)[:, None] - (p // 2 - 1.0)) ** np.arange(p)).T.copy() for p in (4, 6)}
 """Order → coefficient of s^m [k, m] of Lagrange's polynomial of node k of a line, cell between nodes 0 and 1."""
@@ -67,17 +67,10 @@ def _extended(grid: Grid, phi: np.ndarray, reach: int) -> tuple[np.ndarray, list
     extra = [0] * grid.dim
     for a, n in enumerate(grid.n):
         lines = np.moveaxis(q, a, 0)
-        if _wrapped(lines, n):
+        if repeated(lines, n):
             extra[a] = min(reach, n // 2 + 1)
             inside = np.moveaxis(lines[GHOSTS : GHOSTS + n], 0, a)
             width = [(0, 0)] * grid.dim
             width[a] = (extra[a] + GHOSTS,) * 2
             q = np.pad(inside, width, mode="wrap")
     return np.ascontiguousarray(q), extra
-
-
-def _wrapped(lines: np.ndarray, n: int) -> bool:
-    """Whether the ghosts in the first direction repeat the cells, and are not one value, which says nothing."""
-    ghosts = np.concatenate((lines[:GHOSTS], lines[GHOSTS + n :]))
-    gap = np.abs(ghosts - np.concatenate((lines[n : n + GHOSTS], lines[GHOSTS : 2 * GHOSTS]))).max()
-    return gap <= SAME * np.abs(ghosts).max() < np.ptp(ghosts)

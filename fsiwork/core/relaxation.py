@@ -15,6 +15,7 @@ from fsiwork.core.transport import TABLEAUX
 
 STEP = 0.5  # Δτ/Δx: a distance travels half a cell an iteration
 ITERATIONS = 20  # without a band: 10 cells on each side
+SAME = 1e-6  # largest difference of repeated ghosts from their cells, in parts of the largest value
 SADDLE = 0.1  # smallest slope of a crossed cell in parts of the largest difference of its corners
 
 
@@ -47,11 +48,18 @@ def renormalised(grid: Grid, phi: np.ndarray) -> np.ndarray:
 
 
 def wraps(grid: Grid, phi: np.ndarray, a: int) -> bool:
-    """Whether the ghosts in direction a repeat the cells (of one value all over they would say nothing: False)."""
-    q, n = np.moveaxis(grid.padded(phi), a, 0), grid.n[a]
-    ghosts = np.concatenate([q[:GHOSTS], q[n + GHOSTS :]])
-    cells = np.concatenate([q[n : n + GHOSTS], q[GHOSTS : 2 * GHOSTS]])
-    return bool(np.array_equal(ghosts, cells) and (ghosts != ghosts.flat[0]).any())
+    """Whether the ghosts of a flat field in direction a repeat its cells, see `repeated`."""
+    return repeated(np.moveaxis(grid.padded(phi), a, 0), grid.n[a])
+
+
+def repeated(lines: np.ndarray, n: int) -> bool:
+    """Whether the ghosts before and after the ``n`` cells of the first direction repeat the cells, to rounding.
+
+    Ghosts of one value all over say nothing: False.
+    """
+    ghosts = np.concatenate((lines[:GHOSTS], lines[GHOSTS + n :]))
+    gap = np.abs(ghosts - np.concatenate((lines[n : n + GHOSTS], lines[GHOSTS : 2 * GHOSTS]))).max()
+    return bool(gap <= SAME * np.abs(ghosts).max() < np.ptp(ghosts))
 
 
 def beside(grid: Grid, phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
