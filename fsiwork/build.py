@@ -141,6 +141,7 @@ def _shear_membrane(spec, grid: Grid, edges: Edges) -> ShearMembrane:
         twist=spec.twist,
         inflation=spec.inflation,
         alike=spec.alike,
+        coupling=spec.coupling,
     )
 
 

@@ -220,3 +220,60 @@ clock: {end: 1, step: 0.01}
     with pytest.raises(SceneError) as error:
         loads(text, change)
     assert line in str(error.value)
+
+
+def run(coupling, multiple, steps):
+    """Energies over a few steps at a multiple of the explicit limit, and M of the stabiliser after each."""
+    body, flow = sphere(12, twist=1.0, coupling=coupling)
+    limit = kernels_limit(body, flow)
+    rows, held = [], []
+    for _ in range(steps):
+        flow.begin()
+        step(flow, (body,), multiple * limit)
+        rows.append(energy.kinetic_energy(flow) + stored(body))
+        held.append(body._held[0])
+    return rows, held
+
+
+def kernels_limit(body, flow):
+    return 2.8 * body.grid.h * np.sqrt(flow.density * body.eps / body.survey()[kernels.STIFF])
+
+
+def test_beyond_the_explicit_limit_the_stabilised_step_loses_energy_and_the_explicit_one_makes_it():
+    first = stored(sphere(12, twist=1.0)[0])
+    explicit, stabilised = run("explicit", 10, 12)[0], run("stabilised", 30, 12)[0]
+    assert not max(explicit) < 1.1 * first
+    assert max(stabilised) <= first
+    assert stabilised[-1] < 0.99 * first
+
+
+def test_the_stabiliser_lowers_its_modulus_slowly_and_raises_it_at_once():
+    body, flow = sphere(12, twist=1.0, coupling="stabilised")
+    top = body.survey()[kernels.STIFF]
+    flow.begin()
+    body.push(flow, 0.1)
+    assert flow.stiffness == pytest.approx(0.25 * top / body.eps)
+    body._values[kernels.STIFF] = 0.1 * top
+    for _ in range(4):  # looked at again on the last of them
+        flow.begin()
+        body.push(flow, 0.1)
+    assert flow.stiffness == pytest.approx(0.25 * 0.95 * top / body.eps)
+    body._values[kernels.STIFF] = 3 * top
+    state = body.state()
+    for _ in range(4):
+        flow.begin()
+        body.push(flow, 0.1)
+    assert flow.stiffness == pytest.approx(0.25 * 3 * top / body.eps)
+    body.restore(state)
+    assert body._held[0] == pytest.approx(0.95 * top)
+
+
+def test_the_longest_step_of_both_couplings():
+    limits = {c: sphere(12, coupling=c) for c in ("explicit", "stabilised")}
+    found = {c: body.longest_step(flow) for c, (body, flow) in limits.items()}
+    body, flow = limits["explicit"]
+    assert found["explicit"] == {"elastic, shear": pytest.approx(kernels_limit(body, flow))}
+    ratio = body.eps / (2.8 * body.grid.h)
+    assert found["stabilised"] == {"elastic, shear, accuracy": pytest.approx(ratio * kernels_limit(body, flow))}
+    with pytest.raises(ValueError, match="coupling must be one of explicit, stabilised"):
+        sphere(12, coupling="iterated")

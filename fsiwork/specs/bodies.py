@@ -289,7 +289,8 @@ class ShearMembrane(Spec):
     ``law``: quadratic (3.65), linear (E₂' = λ₂), neo-hookean or skalak, see `fsiwork.bodies.shear`; ``area`` and
     ``shear`` are λ₁ and λ₂, ``volume`` a modulus that holds det ∇Y. The shape is that at t = 0,
     ``inflation`` its radius over that at rest, ``twist`` t₀ of (3.67),
-    which ``alike`` continues off the sphere so that all layers of the band are strained alike.
+    which ``alike`` continues off the sphere so that all layers of the band are strained alike. ``coupling: stabilised``
+    allows steps beyond the explicit limit, at a loss of accuracy.
     """
 
     stretch: ClassVar = 1.0
@@ -303,6 +304,7 @@ class ShearMembrane(Spec):
     shear: Positive
     volume: NotNegative = 0.0
     width: Width
+    coupling: Literal["explicit", "stabilised"] = "explicit"
     twist: Number = 0.0
     inflation: Positive = 1.0
     alike: bool = False
