@@ -161,6 +161,14 @@ class Scene(Spec):
             if not isinstance(body, Interface | Markers):
                 yield from tried(self._width_fits(i, body))
 
+    @sense
+    def _one_density_for_bending(self) -> Iterator[Fault]:
+        for i, body in enumerate(self.bodies):
+            bent = isinstance(body, Membrane) and body.bending and body.coupling == "stabilised"
+            if bent and self.fluid and body.inside and body.inside.density != self.fluid.density:
+                text = "with bending and another density inside it must be explicit, got 'stabilised'"
+                yield ("bodies", i, "coupling"), text
+
     def _has_a_fluid(self, i: int, body) -> Iterator[Fault]:
         if self.motion is not None:
             yield ("bodies", i, "kind"), f"{body.kind} needs a fluid; with a motion go bodies of kind interface"

@@ -61,12 +61,26 @@ def test_beyond_its_limit_the_explicit_step_fails_and_the_stabilised_one_does_no
     assert energies["stabilised"].max() < 1.01 * energies["stabilised"][0]
 
 
+@pytest.mark.parametrize("viscosity", [0.001, 10.0])
+def test_the_stabilised_step_serves_two_viscosities(viscosity):
+    """A hundred times less or more inside, eight times the explicit step: it rounds, and gains no energy."""
+    inside = {"inside": {"density": 1.0, "viscosity": viscosity}}
+    sim = build(made(coupling="explicit"))
+    step = 8 * sim.bodies[0].longest_step(sim.flow)["bending"]
+    ended, found = gauges(made(**inside, clock={"step": step}))
+    assert ended == "complete"
+    total = found["kinetic_energy"] + found["elastic_energy"]
+    assert total.max() <= total[0]
+    assert total[-1] < 0.99 * total[0]
+
+
 @pytest.mark.parametrize(
     ("changes", "fault"),
     [
         ({"bending": -1.0}, "bodies.0.bending: must not be negative, got -1"),
         ({"coupling": "iterated"}, "bodies.0.coupling: with bending it must be explicit"),
-        ({"inside": {"density": 2.0, "viscosity": 0.1}}, "bodies.0.coupling: with bending and another fluid inside"),
+        ({"inside": {"density": 2.0, "viscosity": 0.1}}, "bodies.0.coupling: with bending and another density"),
+        ({"surface_mass": 1.0}, "bodies.0.coupling: with bending and a surface mass it must be explicit"),
     ],
 )
 def test_what_does_not_fit_is_said(changes, fault):

@@ -182,6 +182,7 @@ def test_a_uniform_mixture_is_the_constant_fluid(sides, names, monkeypatch):
     div 2μD (twice it) they differ by the step's own error."""
     fields = {"mu": lambda x, y: 0.2 + 0 * x, "rho": lambda x, y: 1.5 + 0 * x}
     monkeypatch.setattr("fsiwork.core.flow.LINES_UP_TO", 0.0)  # no factorisation
+    monkeypatch.setattr("fsiwork.core.flow.LAGGED", 0.0)  # the mixture with μ alone, too
     ends = []
     for normal, dt in ((1.0, 0.02), (2.0, 0.004), (2.0, 0.002)):
         monkeypatch.setattr(mixture, "NORMAL", normal)

@@ -2,8 +2,9 @@
 
 AB2 for advection, Crank-Nicolson for diffusion, incremental pressure with the rotational correction. What a body may
 change between `begin` and `predict` are the slots ``rho``, ``mu``, ``force``, ``stiffness`` and ``bending_stiffness``
-(the last counts for constant ρ and μ only). With variable ρ or μ `core.mixture` does diffusion (backward Euler then,
-unless explicit) and, if ρ varies, the projection.
+(the last counts for constant ρ only). With variable ρ or μ `core.mixture` does diffusion (backward Euler then, unless
+explicit) and, if ρ varies, the projection; but where μ alone varies, up to `LAGGED` times or beside a stabiliser of
+bending, the whole stress 2μD(u) is explicit and the implicit part keeps constant coefficients, those of the largest μ.
 """
 
 import numpy as np
@@ -11,11 +12,12 @@ import numpy as np
 from fsiwork.core.edges import Edges
 from fsiwork.core.grid import GHOSTS, Grid
 from fsiwork.core.kernels import flow as kernels
-from fsiwork.core.mixture import Mixture
+from fsiwork.core.mixture import Mixture, add_stress
 from fsiwork.core.poisson import Direct, Lines
 from fsiwork.core.spectral import Spectral
 
 LINES_UP_TO = 4.0  # α/Δx² up to which the line factorisation serves (MEASURED-poisson 2); beyond it the exact solve
+LAGGED = 10.0  # max μ/min μ up to which a step of constant coefficients serves: it lags so much more, and costs 1/12
 ADVECTION = {"upwind5": 1.0, "central": 1.0, "none": 0.0}
 THETA = {"explicit": 0.0, "implicit": 0.5, "backward-euler": 1.0}  # share of Δu at the new time
 
@@ -50,6 +52,7 @@ class Flow:
         self._old = [grid.field() for _ in grid.axes]
         self._psi, self._minus_div = np.zeros(grid.n), np.zeros(grid.n)
         self._force = None
+        self._constant = True  # the coefficients of this step's implicit part
         self._mixture: dict[str, np.ndarray] = {}
         self._mixed: Mixture | None = None
         self._solvers: dict = {}
@@ -99,16 +102,19 @@ class Flow:
     def predict(self, dt: float) -> None:
         """u* of (3.63) without the new pressure: advection and forces at n, diffusion in increment form."""
         self.dt = dt
-        constant = self.rho is None and self.mu is None
-        if not constant:
+        largest = self._choose()
+        if not self._constant:
             self._mixed = self._mixed or Mixture(self.grid, self.edges)
             self._mixed.prepare(self)
-        kappa = self.theta * dt * self.viscosity / self.density + self.stiffness * dt**2
-        implicit = kappa > 0.0 or self.bending_stiffness > 0.0 or (self.theta > 0.0 and not constant)
+        elif self.mu is not None:
+            for c in self.grid.axes:
+                add_stress(self.grid, self.force[c], c, self.mu, self.u)
+        kappa = self.theta * dt * largest / self.density + self.stiffness * dt**2
+        implicit = kappa > 0.0 or self.bending_stiffness > 0.0 or (self.theta > 0.0 and not self._constant)
         for c in self.grid.axes:
             self._explicit_part(c, dt, increment=implicit)
         for c in self.grid.axes if implicit else ():
-            if constant:
+            if self._constant:
                 self._implicit_part(c, kappa)
             else:
                 self._mixed.increment(self, c, self._star[c])
@@ -125,7 +131,7 @@ class Flow:
             psi, weight = self._project_constant(dt), self.density
         else:
             psi, weight = self._mixed.project(self.u, self._minus_div, self._psi, dt), 1.0
-        if self.rho is None and self.mu is None:
+        if self._constant:
             rows, gain = (psi.reshape(-1), self._minus_div.reshape(-1)), self._kappa * self.density
             kernels.update_pressure(self.p, self.before, *rows, start, n, weight, gain)
         else:
@@ -158,11 +164,28 @@ class Flow:
         self.dt_old = float(state["dt_old"])
 
     # --- parts ------------------------------------------------------------------------------------------------
+    def _choose(self) -> float:
+        """Choose between constant coefficients and `core.mixture`; the viscosity of the former's implicit part.
+
+        θ Δt max(μ)Δ is at least half of Δt div 2μD for θ ≥ ½ where ∫2|D|² = ∫|∇u|², so any Δt and any contrast are
+        stable; open sides, where it is not so, take it twice. The velocity lags by O((max μ - μ)Δt).
+        """
+        if self.mu is None:
+            self._constant, largest = self.rho is None, self.viscosity
+        else:
+            mu = self.grid.inside(self.mu)
+            largest = float(mu.max())
+            open_sides = any(side.kind == "outflow" for pair in self.edges.sides for side in pair)
+            mild = largest <= LAGGED * float(mu.min())
+            self._constant = self.rho is None and (mild or self.bending_stiffness > 0.0)
+            largest *= 2.0 if open_sides else 1.0
+        return largest
+
     def _explicit_part(self, c: int, dt: float, increment: bool) -> None:
         g, h = self.grid, self.grid.h
         ratio = dt / self.dt_old if self.dt_old else 0.0
-        constant = self.rho is None and self.mu is None
-        nu = self.viscosity / self.density if constant else 0.0
+        constant = self._constant
+        nu = self.viscosity / self.density if constant and self.mu is None else 0.0
         coefficients = (
             dt * (1.0 + 0.5 * ratio),
             -0.5 * dt * ratio,

@@ -1,4 +1,4 @@
-"""What variable density and viscosity add to the flow: 2μD(u) partly implicit, a pressure with the coefficient 1/ρ."""
+"""What variable density adds to the flow: 2μD(u) partly implicit, a pressure with the coefficient 1/ρ; the stress."""
 
 import numpy as np
 
@@ -70,7 +70,7 @@ class Mixture:
         if not flow.dt_old and not flow.p.any():
             self._balance(flow)
         for c in g.axes:
-            self._diffuse(force[c], c, self.mu, flow.u, g.h**-2)
+            add_stress(g, force[c], c, self.mu, flow.u)
             kernels.accelerate(force[c], flow.p, self.beta[c], start, n, g.strides[c], 1.0 / g.h)
 
     def increment(self, flow, c: int, out: np.ndarray) -> None:
@@ -140,15 +140,6 @@ class Mixture:
             self.edges.fill_pressure(flow.p)
             flow.before[:] = flow.p
 
-    def _diffuse(self, out, c, mu, u, factor):
-        """out += factor h² (div 2μD(u))_c on the faces of the box."""
-        g = self.grid
-        start, n = g.rows()
-        kernels.add_viscous_normal(out, u[c], mu, start, n, g.strides[c], factor)
-        for b in g.axes:
-            if b != c:
-                kernels.add_viscous_tangential(out, u[c], u[b], mu, start, n, g.strides[c], g.strides[b], factor)
-
     def _pull(self, flow, c, out, c_rho):
         """The stabiliser acts on the difference to the pass before: out -= c_s Δt² div(ρ∇(guess - u))/ρ."""
         g = self.grid
@@ -166,6 +157,16 @@ class Mixture:
                 kernels.add_viscous_tangential(total, self._psi, self._still, self.rho, start, n, *strides, factor)
         total *= self.beta[c]
         out += total
+
+
+def add_stress(grid: Grid, out: np.ndarray, c: int, mu: np.ndarray, u: list[np.ndarray]) -> None:
+    """``out`` += (div 2μD(u))_c [force/volume] on the low faces of the box; flat fields with ghosts, μ at centres."""
+    start, n = grid.rows()
+    factor = grid.h**-2
+    kernels.add_viscous_normal(out, u[c], mu, start, n, grid.strides[c], factor)
+    for b in grid.axes:
+        if b != c:
+            kernels.add_viscous_tangential(out, u[c], u[b], mu, start, n, grid.strides[c], grid.strides[b], factor)
 
 
 def _rows(grid: Grid, first: list[int], shape: list[int]) -> tuple[np.ndarray, int]:

@@ -143,8 +143,8 @@ class Membrane(Spec):
             yield ("transport", "from_interface"), "is for bodies of kind interface"
         if self.bending and self.coupling == "iterated":
             yield ("coupling",), "with bending it must be explicit, semi-implicit or stabilised, got 'iterated'"
-        if self.bending and self.coupling == "stabilised" and (self.inside or self.surface_mass):
-            yield ("coupling",), "with bending and another fluid inside it must be explicit, got 'stabilised'"
+        if self.bending and self.coupling == "stabilised" and self.surface_mass:
+            yield ("coupling",), "with bending and a surface mass it must be explicit, got 'stabilised'"
 
 
 class Bubble(Spec):
