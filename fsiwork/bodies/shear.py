@@ -195,7 +195,7 @@ class ShearMembrane(Body):
 
     def _plan(self):
         g = self.grid
-        self._P = np.zeros((g.size, 12))  # pages that the band never touches cost nothing
+        self._P = np.zeros((12, g.size))  # pages that the band never touches cost nothing
         self._g, self._u = [g.field() for _ in g.axes], [g.field() for _ in g.axes]
         self._q, self.phi = g.field(), g.field()
         self._band, self._inside = Band(g, self.eps, False), Inside(g, self.edges, self.eps)

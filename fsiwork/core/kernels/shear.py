@@ -6,14 +6,17 @@ rest, weight of the energy, moduli of area, shear, volume); ``law`` is a code fr
 """
 
 import numpy as np
-from numba import prange
+from numba import njit, prange
 
-from fsiwork.core.kernels import loop, point
+from fsiwork.core.kernels import FASTMATH, loop, point
 
 QUADRATIC, LINEAR, NEO_HOOKEAN, SKALAK = range(4)  # laws of `energy`
 ENERGY, AREA, SHEARED, SQUARES, LEAST_DET, LEAST1, MOST1, LEAST2, MOST2, STIFF = range(10)  # columns of `survey`
 SUMS = 4  # of them, the first
 TINY = 1e-30
+
+# Formulas of a whole row: inlined by Numba itself, else LLVM leaves a call and no SIMD.
+inline = njit(error_model="numpy", fastmath=FASTMATH, inline="always")
 
 
 @point
@@ -138,7 +141,7 @@ def surface(w, det, m):
 
 @loop
 def stress(out, Y0, Y1, Y2, runs, s, numbers, law, centre, period):
-    """Derivatives of D_ε E at each node of the runs: out[I, :9] by ∇Y (-D FᵀT, by rows), out[I, 9:] by Ȳ.
+    """Derivatives of D_ε E at each node of the runs: out[:9, I] by ∇Y (-D FᵀT, by rows), out[9:, I] by Ȳ.
 
     T = Σ E_i' Z_i C_i - κ(j - 1)j I, j = det ∇Y/weight; by Ȳ it is D'Em + D(∂m/∂Y)ᵀk, k = -2Fᵀ[(e₁ + e₂TrA)I - e₂A]Fm.
     """
@@ -150,7 +153,7 @@ def stress(out, Y0, Y1, Y2, runs, s, numbers, law, centre, period):
             phi = (distance - radius) / eps
             if abs(phi) >= 1.0:
                 for j in range(12):
-                    out[I, j] = 0.0
+                    out[j, I] = 0.0
                 continue
             m = (r[0] / distance, r[1] / distance, r[2] / distance)
             F, f, n, A, trace, _, Z1, Z2 = surface(w, det, m)
@@ -168,57 +171,75 @@ def stress(out, Y0, Y1, Y2, runs, s, numbers, law, centre, period):
             for j in range(3):
                 column = transposed(F, (T[j], T[3 + j], T[6 + j]))
                 for q in range(3):
-                    out[I, 3 * q + j] = -D * column[q]
+                    out[3 * q + j, I] = -D * column[q]
             e1, e2 = 0.5 * dE2 / Z1, 0.5 * (dE1 - dE2 * Z2 / Z1) / Z1
             g = times((A[0], A[3], A[4], A[3], A[1], A[5], A[4], A[5], A[2]), f)
             c = e1 + e2 * trace
             k = transposed(F, (c * f[0] - e2 * g[0], c * f[1] - e2 * g[1], c * f[2] - e2 * g[2]))
             along = k[0] * m[0] + k[1] * m[1] + k[2] * m[2]
             for q in range(3):
-                out[I, 9 + q] = slope * E * m[q] - 2.0 * D * (k[q] - along * m[q]) / distance
+                out[9 + q, I] = slope * E * m[q] - 2.0 * D * (k[q] - along * m[q]) / distance
 
 
-@point
-def gradient(P, q, I, x, y, h):
-    """-(compact divergence of P_q) + mean of h_q, at a centre: the derivative by Y_q of the energy over Δx³."""
-    total = 0.0
-    for a in range(2):
-        for b in range(2):
-            for c in range(2):
-                J = I + a * x + b * y + c
-                total += 0.125 * P[J, 9 + q]
-                k = 0.25 / h
-                total += k * ((1 - 2 * a) * P[J, 3 * q] + (1 - 2 * b) * P[J, 3 * q + 1] + (1 - 2 * c) * P[J, 3 * q + 2])
-    return total
+@inline
+def corners(p, I, n, x, y):
+    """A field at the 8 nodes of the cells of a row, the last direction fastest."""
+    J = I + x
+    return (
+        p[I : I + n], p[I + 1 : I + 1 + n], p[I + y : I + y + n], p[I + y + 1 : I + y + 1 + n],
+        p[J : J + n], p[J + 1 : J + 1 + n], p[J + y : J + y + n], p[J + y + 1 : J + y + 1 + n],
+    )  # fmt: skip
 
 
-@point
-def upwind5(q, I, s, u, h):
-    """∂q as the transport by ``upwind5`` takes it; the mean of both sides where there is no velocity."""
-    far, mid, close = q[I + 3 * s] - q[I - 3 * s], q[I + 2 * s] - q[I - 2 * s], q[I + s] - q[I - s]
-    sixth = q[I + 3 * s] + q[I - 3 * s] - 6 * (q[I + 2 * s] + q[I - 2 * s]) + 15 * (q[I + s] + q[I - s]) - 20 * q[I]
-    side = 1.0 if u > 0.0 else (-1.0 if u < 0.0 else 0.0)
-    return (far - 9 * mid + 45 * close - side * sixth) / (60.0 * h)
+@inline
+def gradient(out, P, q, I, n, x, y, h):
+    """-(compact divergence of P_q) + mean of h_q at the centres of a row: derivatives by Y_q of the energy over Δx³."""
+    k, o = 0.25 / h, out[I : I + n]
+    a0, a1, a2, a3, a4, a5, a6, a7 = corners(P[3 * q], I, n, x, y)
+    b0, b1, b2, b3, b4, b5, b6, b7 = corners(P[3 * q + 1], I, n, x, y)
+    c0, c1, c2, c3, c4, c5, c6, c7 = corners(P[3 * q + 2], I, n, x, y)
+    m0, m1, m2, m3, m4, m5, m6, m7 = corners(P[9 + q], I, n, x, y)
+    for i in range(n):
+        total = (a0[i] + a1[i]) + (a2[i] + a3[i]) - ((a4[i] + a5[i]) + (a6[i] + a7[i]))
+        total += (b0[i] + b1[i]) + (b4[i] + b5[i]) - ((b2[i] + b3[i]) + (b6[i] + b7[i]))
+        total += (c0[i] + c2[i]) + (c4[i] + c6[i]) - ((c1[i] + c3[i]) + (c5[i] + c7[i]))
+        mean = ((m0[i] + m1[i]) + (m2[i] + m3[i])) + ((m4[i] + m5[i]) + (m6[i] + m7[i]))
+        o[i] = k * total + 0.125 * mean
 
 
 @loop
 def gradients(G0, G1, G2, P, runs, s, h):
     """Derivatives of the energy over Δx³ by the components of Y, at the centres of the runs."""
-    x, y = s[0], s[1]
     for t in prange(runs.shape[0]):
-        for I in range(runs[t, 0], runs[t, 0] + runs[t, 1]):
-            G0[I] = gradient(P, 0, I, x, y, h)
-            G1[I] = gradient(P, 1, I, x, y, h)
-            G2[I] = gradient(P, 2, I, x, y, h)
+        gradient(G0, P, 0, runs[t, 0], runs[t, 1], s[0], s[1], h)
+        gradient(G1, P, 1, runs[t, 0], runs[t, 1], s[0], s[1], h)
+        gradient(G2, P, 2, runs[t, 0], runs[t, 1], s[0], s[1], h)
+
+
+@inline
+def pull(out, g, Y, u, I, n, s, k):
+    """out += g ∂Y along stride s as the transport by ``upwind5`` takes it; the mean of both sides where u = 0."""
+    o, G, low, high = out[I : I + n], g[I : I + n], u[I : I + n], u[I + s : I + s + n]
+    m3, m2, m1, p0 = Y[I - 3 * s : I - 3 * s + n], Y[I - 2 * s : I - 2 * s + n], Y[I - s : I - s + n], Y[I : I + n]
+    p1, p2, p3 = Y[I + s : I + s + n], Y[I + 2 * s : I + 2 * s + n], Y[I + 3 * s : I + 3 * s + n]
+    for i in range(n):
+        w = low[i] + high[i]
+        side = 1.0 if w > 0.0 else (-1.0 if w < 0.0 else 0.0)
+        sixth = (p3[i] + m3[i]) - 6.0 * (p2[i] + m2[i]) + 15.0 * (p1[i] + m1[i]) - 20.0 * p0[i]
+        slope = (p3[i] - m3[i]) - 9.0 * (p2[i] - m2[i]) + 45.0 * (p1[i] - m1[i]) - side * sixth
+        o[i] += k * G[i] * slope
 
 
 @loop
 def pulls(out, G0, G1, G2, Y0, Y1, Y2, u, runs, s, h):
     """Σ_q g_q ∂Y_q along stride s at centres; ``u`` [on low faces] says which side is upwind."""
+    k = 1.0 / (60.0 * h)
     for t in prange(runs.shape[0]):
-        for I in range(runs[t, 0], runs[t, 0] + runs[t, 1]):
-            w = u[I] + u[I + s]
-            out[I] = G0[I] * upwind5(Y0, I, s, w, h) + G1[I] * upwind5(Y1, I, s, w, h) + G2[I] * upwind5(Y2, I, s, w, h)
+        I, n = runs[t, 0], runs[t, 1]
+        out[I : I + n] = 0.0
+        pull(out, G0, Y0, u, I, n, s, k)
+        pull(out, G1, Y1, u, I, n, s, k)
+        pull(out, G2, Y2, u, I, n, s, k)
 
 
 @loop
@@ -231,20 +252,20 @@ def to_faces(out, q, start, n, s):
             o[i] = 0.5 * (here[i] + low[i])
 
 
-@point
-def line(q, I):
-    """(1, 2, 1)/4 along the rows."""
-    return 0.25 * (q[I - 1] + q[I + 1]) + 0.5 * q[I]
-
-
 @loop
 def smooth(out, q, start, n, x, y, add):
-    """out = add out + q filtered by (1, 2, 1)/4 once along each axis."""
+    """out = add out + q filtered by (1, 2, 1)/4 once along each axis; across the rows first, then along them."""
     for r in prange(start.size):
-        for I in range(start[r], start[r] + n):
-            sides = line(q, I - x) + line(q, I + x) + line(q, I - y) + line(q, I + y)
-            ends = line(q, I - x - y) + line(q, I - x + y) + line(q, I + x - y) + line(q, I + x + y)
-            out[I] = add * out[I] + 0.25 * line(q, I) + 0.125 * sides + 0.0625 * ends
+        I, m = start[r] - 1, n + 2
+        a, b, c = q[I - x - y : I - x - y + m], q[I - x : I - x + m], q[I - x + y : I - x + y + m]
+        d, e, f = q[I - y : I - y + m], q[I : I + m], q[I + y : I + y + m]
+        g, h, k = q[I + x - y : I + x - y + m], q[I + x : I + x + m], q[I + x + y : I + x + y + m]
+        line = np.empty(m)
+        for i in range(m):
+            line[i] = 0.25 * e[i] + 0.125 * ((b[i] + d[i]) + (f[i] + h[i])) + 0.0625 * ((a[i] + c[i]) + (g[i] + k[i]))
+        o, low, mid, high = out[I + 1 : I + 1 + n], line[:n], line[1 : n + 1], line[2:]
+        for i in range(n):
+            o[i] = add * o[i] + 0.5 * mid[i] + 0.25 * (low[i] + high[i])
 
 
 @loop
