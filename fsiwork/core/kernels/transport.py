@@ -15,7 +15,7 @@ from fsiwork.core.kernels import FASTMATH, loop
 UPWIND1, UPWIND5, WENO5, WENO_Z = range(4)
 
 # Whole numbers (only: 1/3 would be rounded) in single precision, so that float32 fields stay float32.
-TWO, THREE, SIX, TEN, THIRTEEN = (np.float32(c) for c in (2, 3, 6, 10, 13))
+TWO, THREE, SIX, NINE, THIRTEEN, FIFTEEN, FORTY_FIVE, SIXTY = (np.float32(c) for c in (2, 3, 6, 9, 13, 15, 45, 60))
 
 # Numba itself must inline these: LLVM leaves the longest formula a call, and a loop with a call has no SIMD.
 inline = njit(error_model="numpy", fastmath=FASTMATH, inline="always")
@@ -28,8 +28,8 @@ peak = njit(parallel=True, error_model="numpy", fastmath=FASTMATH | {"nnan"}, ca
 def difference(scheme, m3, m2, m1, o, p1, p2, r2, e):
     """h ∂q at ``o`` from three points upstream (m) and two downstream (p).
 
-    Weighted mean of three parabolas with the ideal weights (1, 6, 3)/10 for `UPWIND5`, those of Jiang and
-    Shu for `WENO5`, of Borges et al. for `WENO_Z`; put over one denominator: one division.
+    Weighted mean of three parabolas with the weights of Jiang and Shu for `WENO5`, of Borges et al. for `WENO_Z`; put
+    over one denominator: one division. With the ideal weights (1, 6, 3)/10 it is linear: `ideal`.
     """
     v2 = m1 - m2
     v3 = o - m1
@@ -44,8 +44,6 @@ def difference(scheme, m3, m2, m1, o, p1, p2, r2, e):
     middle = v3 + (c2 + c3 + c3) / SIX
     left = e1 - e2
     right = e2 - e3
-    if scheme == UPWIND5:
-        return middle + (left + left + THREE * right) / (SIX * TEN)
     f1 = c2 + c2 + e1
     f2 = c2 + c3
     f3 = c3 + c3 - e3
@@ -68,11 +66,21 @@ def difference(scheme, m3, m2, m1, o, p1, p2, r2, e):
 
 
 @inline
+def ideal(u, m3, m2, m1, o, p1, p2, p3):
+    """h u ∂q with the ideal weights, both sides at once: the centred sixth-order one, less |u|/60 sixth differences."""
+    a, b, c, d, e, f = m3 - o, m2 - o, m1 - o, p1 - o, p2 - o, p3 - o
+    slope = (f - a) - NINE * (e - b) + FORTY_FIVE * (d - c)
+    return (u * slope - abs(u) * ((f + a) - SIX * (e + b) + FIFTEEN * (d + c))) / SIXTY
+
+
+@inline
 def along(scheme, u, m3, m2, m1, o, p1, p2, p3, r2, e):
     """h u ∂q of one axis; where the velocity is negative the mirrored stencil, whose sign is |u|/u.
 
     Both sides are loaded by now: a choice between loads would turn them into gathers.
     """
+    if scheme == UPWIND5:
+        return ideal(u, m3, m2, m1, o, p1, p2, p3)
     f = u > 0
     d = difference(
         scheme,
