@@ -34,23 +34,23 @@ def study(
 ) -> None:
     """Compute a study: all its jobs and the dataset joined from them, or with --job one of its jobs."""
     _prepare()
-    from fsiwork.studies import sweep
+    from fsiwork.studies import jobs
 
     plan = Plan(configs, results)
     found = plan.study(name, size)
     for one in [job] if job else found.batches:
-        for file in sweep.compute(plan, found, one, size):
+        for file in jobs.compute(plan, found, one, size):
             print(file)
     if not job:
-        print(sweep.join(plan, found, size))
+        print(jobs.join(plan, found, size))
 
 
 def join(name: Name, size: Size = "coarse", configs: Configs = CONFIGS, results: Results = RESULTS) -> None:
     """Put the runs of a study together: one dataset with its axes as dimensions."""
-    from fsiwork.studies import sweep
+    from fsiwork.studies import jobs
 
     plan = Plan(configs, results)
-    print(sweep.join(plan, plan.study(name, size), size))
+    print(jobs.join(plan, plan.study(name, size), size))
 
 
 def measure(
@@ -156,11 +156,11 @@ def verify(results: Results = RESULTS) -> None:
 def warm(size: Size = "coarse", configs: Configs = CONFIGS) -> None:
     """Compile the kernels that the studies need, once, before many processes want them at the same time."""
     _prepare()
-    from fsiwork.studies import sweep
+    from fsiwork.studies import jobs
 
     plan = Plan(configs)
     with_scene = [(plan.scene(one), one.points) for one in plan.studies(size) if one.scene]
-    count = sweep.warm((path, point.overrides) for path, points in with_scene for point in points)
+    count = jobs.warm((path, point.overrides) for path, points in with_scene for point in points)
     print(f"{count} different scenes compiled")
 
 

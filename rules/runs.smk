@@ -108,7 +108,7 @@ rule join:
     params:
         configs=PLAN.configs,
         points=PLAN.points_of,
-        code=source_hash("studies.sweep", "joining"),
+        code=source_hash("studies.jobs", "joining"),
     shell:
         "NUMBA_NUM_THREADS=1 python -m fsiwork join {wildcards.study:q} --size {wildcards.size:q}"
         " --configs {params.configs:q} > {log:q} 2>&1"

@@ -12,7 +12,7 @@ import yaml
 from numba import njit
 
 from fsiwork.core.kernels import FASTMATH
-from fsiwork.studies import scorecard, sweep
+from fsiwork.studies import jobs, scorecard
 from fsiwork.targets import Plan
 
 CONFIGS = Path(__file__).resolve().parents[1] / "configs"
@@ -87,8 +87,8 @@ def colours(folder, artefact):
     made = plan(folder, artefact)
     for study in made.studies("coarse"):
         for job in study.batches:
-            sweep.compute(made, study, job, "coarse")
-        sweep.join(made, study, "coarse")
+            jobs.compute(made, study, job, "coarse")
+        jobs.join(made, study, "coarse")
     found = scorecard.measure(made, made.entry(artefact, "coarse"), "coarse")
     return {row["metric"]: row["pass"] for row in found["rows"]}
 

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fsiwork import scene
 from fsiwork.studies.stability import releasable
 from fsiwork.studies.sweep import curve
 
@@ -35,6 +34,8 @@ def unstable_from(data: xr.Dataset, **point: Any) -> float:
     Unstable (MEASURED-coupling 1): kinetic energy above 1.1 times the elastic energy that can be released, interface
     longer than 1.01 times at first, not finite, or ended as diverged. The whole run counts.
     """
+    from fsiwork import scene
+
     most = 1.1 * releasable(scene.Scene.model_validate(spec(data, **point)))
     t, kinetic = curve(data, "kinetic_energy", **point)
     length = curve(data, "length", **point)[1]
