@@ -167,6 +167,7 @@ SHAPES = {
     "box": shapes.Box,
     "polygon": shapes.Polygon,
     "capsule": shapes.Capsule,
+    "tablet": shapes.Tablet,
     "torus": shapes.Torus,
     "cassini": shapes.Cassini,
     "slot": shapes.Slot,

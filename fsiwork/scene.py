@@ -29,7 +29,7 @@ from fsiwork.specs.bodies import (
     Transport,
     Width,
 )
-from fsiwork.specs.box import Box, Edges, FreeSlip, Inflow, NoSlip, Outflow, Periodic, Side, Wall
+from fsiwork.specs.box import Box, Edges, FreeSlip, Inflow, NoSlip, Outflow, Periodic, Side, Symmetry, Wall
 from fsiwork.specs.faults import Fault, got, wording, wrong
 from fsiwork.specs.fluid import Fluid, Inside, Rest, Shear, TaylorGreen
 from fsiwork.specs.lines import Fibre, Ring
@@ -46,6 +46,7 @@ from fsiwork.specs.shapes import (
     Polygon,
     Shape,
     Slot,
+    Tablet,
     Torus,
     Union,
 )
@@ -56,8 +57,8 @@ __all__ = [
     "Edges", "Ellipsoid", "Energy", "Fibre", "Fluid", "FreeSlip", "Inflow", "Inside", "Interface", "Intersection",
     "Law", "Linear", "Markers", "Membrane", "Minus", "Motion", "Moved", "NoSlip", "Outflow", "Output", "Periodic",
     "Polygon", "Quadratic", "Redistance", "Rest", "Ring", "Rotation", "Scene", "SceneError", "Shape", "Shear",
-    "ShearMembrane", "Side", "Slot", "TaylorGreen", "Torus", "Translation", "Transport", "Union", "Vortex", "Wall",
-    "Width", "faults", "load", "loads",
+    "ShearMembrane", "Side", "Slot", "Symmetry", "Tablet", "TaylorGreen", "Torus", "Translation", "Transport", "Union",
+    "Vortex", "Wall", "Width", "faults", "load", "loads",
 ]  # fmt: skip
 
 
@@ -169,6 +170,14 @@ class Scene(Spec):
                 text = "with bending and another density inside it must be explicit, got 'stabilised'"
                 yield ("bodies", i, "coupling"), text
 
+    @sense
+    def _mirrored(self) -> Iterator[Fault]:
+        if "symmetry" not in {side.kind for pair in self.box.sides for side in pair}:
+            return
+        for i, body in enumerate(self.bodies):
+            if not (isinstance(body, Membrane | Interface | Bubbles) and body.transport.carry == "field"):
+                yield ("bodies", i), "at planes of symmetry only bodies that carry a field are mirrored"
+
     def _has_a_fluid(self, i: int, body) -> Iterator[Fault]:
         if self.motion is not None:
             yield ("bodies", i, "kind"), f"{body.kind} needs a fluid; with a motion go bodies of kind interface"
@@ -235,7 +244,14 @@ def _outside(shape, box: Box) -> Iterator[Fault]:
         if box.sides[a][0].kind == "periodic":
             if not high - low <= box.length[a]:
                 yield (), f"is wider than the periodic box along {'xyz'[a]} ({high - low:.6g} > {box.length[a]:.6g})"
-        elif not (low >= first and high <= last):
+            continue
+        mirrors = [p for p, side in zip((first, last), box.sides[a], strict=True) if side.kind == "symmetry"]
+        crossed = [p for p in mirrors if low < p < high]
+        for plane in crossed:
+            if not abs(low + high - 2.0 * plane) <= 1e-9 * box.length[a]:
+                yield (), f"crosses the plane of symmetry {'xyz'[a]} = {plane:.6g} and is not its own mirror image"
+        inside = (low >= first or first in crossed) and (high <= last or last in crossed)
+        if not inside:
             yield (
                 (),
                 f"leaves the box along {'xyz'[a]}: [{low:.6g}, {high:.6g}] is not inside [{first:.6g}, {last:.6g}]",

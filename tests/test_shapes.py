@@ -17,6 +17,7 @@ from fsiwork.core.shapes import (
     Moved,
     Polygon,
     Slot,
+    Tablet,
     Torus,
     Union,
 )
@@ -143,6 +144,11 @@ def test_three_dimensional_shapes_against_their_section():
     )
     np.testing.assert_allclose(
         Torus((0, 0, 0), 0.6, 0.2).distance(x, y, z), Ball((0.6, 0.0), 0.2).distance(np.hypot(x, y), z), atol=1e-14
+    )
+    np.testing.assert_allclose(
+        Tablet((0, 0, 0), 0.4, 0.2).distance(x, y, z),
+        Capsule((-0.4, 0), (0.4, 0), 0.2).distance(np.hypot(x, y), z),
+        atol=1e-14,
     )
     np.testing.assert_allclose(
         Ellipsoid((0, 0, 0), (0.7, 0.3, 0.3)).distance(x, y, z),

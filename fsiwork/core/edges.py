@@ -7,13 +7,16 @@ import numpy as np
 from fsiwork.core.grid import GHOSTS, Grid
 from fsiwork.core.kernels.edges import copy, extrapolate, put, reflect
 
-KINDS = ("periodic", "no-slip", "free-slip", "wall", "inflow", "outflow")
+KINDS = ("periodic", "no-slip", "free-slip", "symmetry", "wall", "inflow", "outflow")
 HELD = ("no-slip", "wall", "inflow")  # the whole velocity is given
 
 
 @dataclass(frozen=True)
 class Side:
-    """One side of the box. ``velocity`` [length/time] counts for a moving wall and an inflow (its peak)."""
+    """One side of the box. ``velocity`` [length/time] counts for a moving wall and an inflow (its peak).
+
+    ``symmetry`` is free slip for the velocity, and what crosses it is its own mirror image.
+    """
 
     kind: str
     velocity: tuple[float, ...] = ()
@@ -51,7 +54,8 @@ class Edges:
         ends = []
         for a, pair in enumerate(self.sides):
             held = "node" if a == c else "dirichlet"
-            free = {"periodic": "periodic", "outflow": "neumann", "free-slip": "node" if a == c else "neumann"}
+            slip = "node" if a == c else "neumann"
+            free = {"periodic": "periodic", "outflow": "neumann", "free-slip": slip, "symmetry": slip}
             ends.append(tuple(free.get(side.kind, held) for side in pair))
         return tuple(ends)
 
@@ -59,7 +63,8 @@ class Edges:
         """Fill the ghosts of a centre field: ``linear`` extrapolation or ``mirror`` (zero normal derivative).
 
         Linear but for inflow sides, which take the value of the first cell: a slope taken from within would decide
-        what enters, drift, and bring φ < 0 out of nothing; so what stands at an inlet goes on coming in.
+        what enters, drift, and bring φ < 0 out of nothing; so what stands at an inlet goes on coming in. At planes of
+        symmetry it is mirror always.
         """
         for a, s in enumerate(self.grid.strides):
             line, n = self._lines[a], self.grid.n[a]
@@ -70,6 +75,8 @@ class Edges:
                     if side.kind == "inflow":
                         for k in range(1, GHOSTS + 1):
                             copy(q, line, edge + k * step, edge, step, 1)
+                    elif side.kind == "symmetry":
+                        reflect(q, line, edge + step, edge, step, GHOSTS, 1.0, ZERO)
                     else:
                         extrapolate(q, line, edge, step, GHOSTS)
             else:

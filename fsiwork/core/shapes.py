@@ -125,6 +125,21 @@ class Capsule:
 
 
 @dataclass(frozen=True)
+class Tablet:
+    """All points within ``edge`` of the flat disc of ``radius`` across z: a cylinder with a round rim."""
+
+    centre: Vector
+    radius: float
+    edge: float
+
+    def distance(self, *x):
+        """See `Shape.distance`."""
+        x, y, z = _from(self.centre, x)
+        beyond = _norm([x, y]) - self.radius
+        return np.where(beyond > 0, _norm([beyond, z]), np.abs(z)) - self.edge
+
+
+@dataclass(frozen=True)
 class Torus:
     """A ring about the z direction (book, 7.1): ``radius`` to the middle of its tube, ``tube`` of the tube."""
 

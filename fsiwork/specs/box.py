@@ -24,9 +24,15 @@ class NoSlip(Spec):
 
 
 class FreeSlip(Spec):
-    """No flow through, no shear stress; also a plane of symmetry."""
+    """No flow through, no shear stress."""
 
     kind: Literal["free-slip"] = "free-slip"
+
+
+class Symmetry(Spec):
+    """A plane of symmetry: free slip, and bodies that cross it are their own mirror images."""
+
+    kind: Literal["symmetry"] = "symmetry"
 
 
 class Wall(Spec):
@@ -50,8 +56,8 @@ class Outflow(Spec):
     kind: Literal["outflow"] = "outflow"
 
 
-Side = one_of(Periodic, NoSlip, FreeSlip, Wall, Inflow, Outflow, short=True)
-SideSpec = Periodic | NoSlip | FreeSlip | Wall | Inflow | Outflow
+Side = one_of(Periodic, NoSlip, FreeSlip, Symmetry, Wall, Inflow, Outflow, short=True)
+SideSpec = Periodic | NoSlip | FreeSlip | Symmetry | Wall | Inflow | Outflow
 
 
 def _both(value):

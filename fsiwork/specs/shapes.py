@@ -107,6 +107,20 @@ class Capsule(_Shape):
         return max(_dot(self.start, d), _dot(self.end, d)) + self.radius * math.hypot(*d)
 
 
+class Tablet(_Shape):
+    """All points within ``edge`` of the flat disc of ``radius`` across z: a cylinder with a round rim."""
+
+    kind: Literal["tablet"] = "tablet"
+    centre: Vector
+    radius: Positive
+    edge: Positive
+    dims: ClassVar = (3,)
+
+    def reach(self, d):
+        """See `_Shape.reach`."""
+        return _dot(self.centre, d) + self.radius * math.hypot(*d[:2]) + self.edge * math.hypot(*d)
+
+
 class Torus(_Shape):
     """A ring around the z direction: ``radius`` to the middle of the tube, ``tube`` the radius of the tube."""
 
@@ -254,7 +268,7 @@ class Moved(_Shape):
         return tuple(v[i] * cos + cross[i] * sin + k[i] * along for i in range(len(d)))
 
 
-SHAPES = (Ball, Ellipsoid, Block, Polygon, Capsule, Torus, Cassini, Slot, Union, Intersection, Minus, Moved)
+SHAPES = (Ball, Ellipsoid, Block, Polygon, Capsule, Tablet, Torus, Cassini, Slot, Union, Intersection, Minus, Moved)
 Shape = one_of(*SHAPES)
 for _cls in (Union, Intersection, Minus, Moved):
     _cls.model_rebuild()
