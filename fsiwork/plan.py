@@ -30,6 +30,7 @@ COST = {
     "prediction of φ, direct": (8.0, 12.0, 6e4),
     "distance anew": (60.0, 300.0, 1e5),
     "gauges": (3.5, 7.0, 7e4),
+    "geometric gauges": (0.0, 125.0, 0.0),  # in the plane a part of the gauges
 }
 START = 1.0  # seconds to load everything, kernels from the cache
 
@@ -230,6 +231,8 @@ def _stages(scene: Scene, solvers) -> list[tuple[str, float]]:
     for name, count in found:
         totals[name] = totals.get(name, 0.0) + passes * count
     totals["gauges"] = (1 + len(scene.bodies)) / scene.output.gauges_every
+    if scene.output.geometric:
+        totals["geometric gauges"] = len(scene.bodies) / scene.output.gauges_every
     return list(totals.items())
 
 

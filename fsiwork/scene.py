@@ -101,11 +101,16 @@ class Clock(Spec):
 
 
 class Output(Spec):
-    """What is kept: fields of the frames (``u`` is the whole velocity), and gauges every so many steps."""
+    """What is kept: fields of the frames (``u`` is the whole velocity), and gauges every so many steps.
+
+    ``geometric`` adds volumes and areas by height functions to the smeared gauges of bodies in space, where they cost
+    as much as a step (in the plane they always stand there).
+    """
 
     fields: tuple[Literal["u", "v", "w", "p", "phi", "rho", "mu", "vorticity", "Y"], ...] = ("u", "p", "phi")
     dtype: Literal["float64", "float32"] = "float64"
     gauges_every: whole(1) = 1
+    geometric: bool = False
 
 
 class Scene(Spec):

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fsiwork.bodies.body import Body
+from fsiwork.bodies.interface import measures
 from fsiwork.build import parts
 from fsiwork.core import energy
 from fsiwork.core.flow import Flow
@@ -157,13 +158,20 @@ class Simulation:
     def gauges(self) -> dict[str, float | list[float]]:
         """Numbers of this moment: of a flow energies, power and residual of (3.23) since the last call, and what bodies
         measure."""
-        fluid, answers = isinstance(self.flow, Flow), [body.gauges(self.flow) for body in self.bodies]
+        fluid, answers = isinstance(self.flow, Flow), [self._of(body) for body in self.bodies]
         row = {"t": self.t, "dt": self.dt} | (_energies(self.flow) if fluid else {})
         for name in dict.fromkeys(name for answer in answers for name in answer):
             values = [answer.get(name, math.nan) for answer in answers]
             row[name] = values[0] if len(values) == 1 else values
         stored = sum(answer.get("elastic_energy", 0.0) for answer in answers)
         return self._balanced(row, stored) if fluid else row
+
+    def _of(self, body: Body) -> dict[str, float]:
+        """What a body measures, and its volume and area by height functions if the scene asks for them."""
+        row, phi = body.gauges(self.flow), body.fields().get("phi")
+        if not self.scene.output.geometric or phi is None:
+            return row
+        return row | {f"geometric_{name}": value for name, value in measures(self.flow.grid, phi).items()}
 
     def _balanced(self, row: dict, stored: float) -> dict:
         """The row with the residual of (3.23); ``stored``: elastic energy of all bodies."""

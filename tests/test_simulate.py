@@ -59,6 +59,13 @@ def test_the_number_of_steps_is_rounded_up_and_t_ends_at_the_end():
     assert np.concatenate([f.gauges["dt"] for f in found[1:]]) == pytest.approx(0.04)
 
 
+def test_geometric_gauges_in_space_on_request():
+    plain, asked = (next(frames(scene("drop_3d", output__geometric=on))).gauges for on in (False, True))
+    assert set(asked) - set(plain) == {"geometric_volume", "geometric_area"}
+    assert asked["geometric_volume"][0] == pytest.approx(4 / 3 * np.pi * 0.6 * 0.5 * 0.5, rel=1e-4)
+    assert abs(asked["volume"][0] / asked["geometric_volume"][0] - 1) > 0.01  # what smearing over 3 of 24 cells adds
+
+
 def test_gauges_every_so_many_steps_and_at_frames():
     found = list(frames(scene(output__gauges_every=4, clock__frames=2)))
     assert [round(t / 0.01) for f in found for t in f.gauges["t"]] == [0, 4, 6, 8, 12]
