@@ -61,6 +61,7 @@ def _membrane(spec, grid: Grid, edges: Edges) -> Membrane:
         inside=None if spec.inside is None else (spec.inside.density, spec.inside.viscosity),
         surface_mass=spec.surface_mass,
         bending=spec.bending,
+        renew=spec.renew,
     )
 
 

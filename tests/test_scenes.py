@@ -41,10 +41,16 @@ def carried(name, how):
     if how == "map":
         found |= {f"bodies__{i}__redistance": None for i, body in enumerate(made.bodies) if body.kind == "interface"}
         changed = {"film": 0.0, "keep_volume": False}  # what changes φ has no place in a map
+        found |= same_lines(made)
         bubbles = [i for i, body in enumerate(made.bodies) if body.kind == "bubbles"]
         found |= {f"bodies__{i}__{key}": value for i in bubbles for key, value in changed.items()}
     fields = [field for field in made.output.fields if field != "Y"] + ["Y"] * (how == "map" and bool(found))
     return found | ({"output__fields": fields} if found else {})
+
+
+def same_lines(made):
+    """Overrides that let φ alone: no lines drawn anew."""
+    return {f"bodies__{i}__renew": 0 for i, body in enumerate(made.bodies) if body.kind == "membrane"}
 
 
 def run(made):
@@ -81,7 +87,8 @@ def test_every_scene_runs_and_keeps_what_a_flow_keeps(name, carry):
     for field, (_, q) in sim.fields(made.output.fields).items():
         assert np.isfinite(q).all(), field
     if "volume" in gauges:  # not of curves in space
-        bound = 1e-2 if name in ("zalesak", "enright") else 1e-3  # a slot of 1.6 cells, a ball of 5
+        thin = ("zalesak", "enright", "vesicle")  # a slot of 1.6 cells, a ball of 5, a vesicle of 3
+        bound = 1e-2 if name in thin else 1e-3
         assert np.abs(gauges["volume"] / gauges["volume"][0] - 1).max() < bound
         free = [body for body in sim.bodies if hasattr(body, "map") and not isinstance(body, ShearMembrane)]
         maps = [body.map is not None for body in free]
@@ -91,7 +98,9 @@ def test_every_scene_runs_and_keeps_what_a_flow_keeps(name, carry):
 @pytest.mark.parametrize("name", [n for n in NAMES if any(body.kind == "membrane" for body in small(n).bodies)])
 def test_field_and_map_carry_the_interface_alike(name):
     """The same volume and the same half-axes to a tenth of a cell; both know where the material was."""
-    (one, field), (other, back) = (run(small(name, **carried(name, how))) for how in ("field", "map"))
+    (one, field), (other, back) = (
+        run(small(name, **same_lines(small(name)) | carried(name, how))) for how in ("field", "map")
+    )
     h = one.flow.grid.h
     for key in field:
         if key.startswith(("axis", "centroid")):

@@ -116,6 +116,10 @@ RUNS = {
     "stabilised map": ("elliptic_membrane", {"bodies.0.coupling": "stabilised", "bodies.0.transport.carry": "map"}),
     "variable density": ("rising_drop", WIDE),
     "walls, map": ("sheared_drop", {"output.gauges_every": 4}),
+    "lines drawn anew": (
+        "sheared_drop",
+        {"bodies.0.transport.carry": "field", "bodies.0.renew": 3, "output.fields": ["phi"]},
+    ),
     "two bodies": ("two_drops", WIDE),
     "lid, explicit": ("cavity", {"fluid.diffusion": "explicit"}),
     "three directions": ("drop_3d", {"box.cells": 16, "clock.end": 0.04, "clock.frames": 2, "output.gauges_every": 3}),

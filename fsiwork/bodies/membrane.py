@@ -10,6 +10,7 @@ from fsiwork.bodies.bending import Bending
 from fsiwork.bodies.body import Body
 from fsiwork.bodies.inside import Inside
 from fsiwork.bodies.laws import LINEAR, AtPoints, Law
+from fsiwork.bodies.layers import Layers
 from fsiwork.bodies.pull import Pull
 from fsiwork.core.edges import Edges
 from fsiwork.core.grid import Grid
@@ -46,6 +47,7 @@ class Membrane(Body):
     inside : density and viscosity inside, if they differ from the fluid's
     surface_mass : mass per rest area
     bending : modulus k of ½kH² [energy]; (3.2.4), see `bodies.bending`
+    renew : moves of φ after which the lines φ = c beside the interface are drawn anew, see `bodies.layers`; 0: never
 
     Attributes
     ----------
@@ -56,7 +58,7 @@ class Membrane(Body):
 
     Raises
     ------
-    ValueError : an unknown word, or a map without a distance
+    ValueError : an unknown word, a map without a distance, or one that is to be renewed
     """
 
     def __init__(
@@ -76,8 +78,9 @@ class Membrane(Body):
         inside: tuple[float, float] | None = None,
         surface_mass: float = 0.0,
         bending: float = 0.0,
+        renew: int = 0,
     ):
-        self._check(phi0, dirac, coupling, carry)
+        self._check(phi0, dirac, coupling, carry, renew)
         self.grid, self.edges, self.transport, self.eps = grid, edges, transport, float(eps)
         self.coupling, self.inside, self.surface_mass = coupling, inside, float(surface_mass)
         self._law = AtPoints(law, grid)
@@ -95,6 +98,7 @@ class Membrane(Body):
         else:
             self.phi[:] = phi0
             edges.fill_scalar(self.phi, "linear")
+        self._layers = Layers(grid, edges, self.eps, renew)
         self._plan()
 
     # --- verbs ------------------------------------------------------------------------------------------------
@@ -133,6 +137,7 @@ class Membrane(Body):
             self._from_distance(self.map.home())
         else:
             self.transport.advance([self.phi], flow.u, dt, "linear")
+            self._layers.moved(self.phi)
         self._fresh = False
 
     # --- answers ----------------------------------------------------------------------------------------------
@@ -159,13 +164,14 @@ class Membrane(Body):
         return {"elastic, accuracy": often * min(limits.values())} | bent
 
     def state(self) -> dict[str, np.ndarray]:
-        """φ, and Y if it is carried."""
-        return {name: q.copy() for name, q in self._named().items()}
+        """φ, and Y if it is carried; how often φ has moved if that counts."""
+        return {name: q.copy() for name, q in self._named().items()} | self._layers.state()
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Take back a `state`."""
         for name, q in self._named().items():
             q[:] = state[name]
+        self._layers.restore(state)
         self._fresh = False
 
     def fields(self) -> dict[str, np.ndarray]:
@@ -228,7 +234,7 @@ class Membrane(Body):
         return self._tilde
 
     # --- parts ------------------------------------------------------------------------------------------------
-    def _check(self, phi0, dirac, coupling, carry):
+    def _check(self, phi0, dirac, coupling, carry, renew):
         for name, value, known in (
             ("dirac", dirac, ("auto", "plain", "renormalised")),
             ("coupling", coupling, COUPLINGS),
@@ -238,6 +244,8 @@ class Membrane(Body):
                 raise ValueError(f"{name} must be one of {', '.join(known)}, got {value!r}")
         if carry == "map" and not callable(phi0):
             raise ValueError("a map needs a distance (function of coordinates), not a field")
+        if carry == "map" and renew:
+            raise ValueError("a map makes φ anew each step: nothing to renew")
 
     def _plan(self):
         g = self.grid

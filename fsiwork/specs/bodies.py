@@ -119,7 +119,9 @@ class Membrane(Spec):
     """An elastic interface that reacts to its change of area (Chapter 3); with a linear law, a drop.
 
     ``stretch`` is |∇φ₀|, the first ratio of current to rest area; ``surface_mass`` is per rest area; ``bending`` is the
-    modulus k of the energy ½kH². ``form`` and ``dirac`` are chosen by the law unless an expert overrides them.
+    modulus k of the energy ½kH². ``form`` and ``dirac`` are chosen by the law unless an expert overrides them. After
+    ``renew`` steps (0: never) the lines φ = c beside the interface are drawn anew, at the distance to it times its
+    stretch: for membranes and drops that tank-tread.
     """
 
     kind: Literal["membrane"] = "membrane"
@@ -133,6 +135,7 @@ class Membrane(Spec):
     inside: Inside | None = None
     surface_mass: NotNegative = 0.0
     bending: NotNegative = 0.0
+    renew: whole(0) = 0
     transport: Transport = Transport()
 
     @sense
@@ -141,6 +144,8 @@ class Membrane(Spec):
             yield ("transport", "band"), "is for kind: interface; a membrane's |∇φ| is its stretch"
         if self.transport.from_interface:
             yield ("transport", "from_interface"), "is for bodies of kind interface"
+        if self.renew and self.transport.carry == "map":
+            yield ("renew",), "is for transport.carry: field; a map makes φ anew each step"
         if self.bending and self.coupling == "iterated":
             yield ("coupling",), "with bending it must be explicit, semi-implicit or stabilised, got 'iterated'"
         if self.bending and self.coupling == "stabilised" and self.surface_mass:

@@ -6,10 +6,13 @@ whether it is periodic. A place outside the padded box is moved to its edge; a p
 
 from math import floor
 
+import numpy as np
 from numba import prange
 
 from fsiwork.core.grid import GHOSTS
 from fsiwork.core.kernels import loop, point
+
+FLAT = 0.04  # least |∇d|² of a distance that has a direction: less at the ridges of d and beyond a band
 
 
 @point
@@ -123,3 +126,59 @@ def at_interface_3d(out, u, q, start, n, s, a, box, joined):
             y = around(I % s[0] // s[1] - d * gy, box[1], joined[1])
             z = around(I % s[1] - d * gz, box[2], joined[2])
             out[I] = at3(u, s, box, x, y, z)
+
+
+@point
+def steepness(q, I, s):
+    """4h²|∇q|² at a centre, of central differences; s[2] is 0 in the plane."""
+    a, b, c = q[I + s[0]] - q[I - s[0]], q[I + s[1]] - q[I - s[1]], q[I + s[2]] - q[I - s[2]]
+    return a * a + b * b + c * c
+
+
+@loop
+def stretches(out, q, d, start, n, s, h):
+    """``out`` = |∇q|/|∇d| at the centres of the box, 0 where d is flat: both with the error of the same differences."""
+    least = 4.0 * h * h * FLAT
+    for r in prange(start.size):
+        for I in range(start[r], start[r] + n):
+            flat = steepness(d, I, s)
+            out[I] = np.sqrt(steepness(q, I, s) / flat) if flat > least else 0.0
+
+
+@point
+def beyond(there, d, ends, reach):
+    """``there`` between the two ``ends``; for |d| from reach[0] to reach[1] it goes over to the larger one."""
+    there, part = min(max(there, ends[0]), ends[1]), (abs(d) - reach[0]) / (reach[1] - reach[0])
+    return there + (ends[1] - there) * min(max(part, 0.0), 1.0)
+
+
+@loop
+def stretched_2d(out, d, stretch, start, n, s, box, joined, ends, reach, h):
+    """``out`` = d times ``stretch`` at x - d∇d/|∇d|², the nearest point where d = 0; far off, and where d is flat,
+    times the larger one of its ``ends``, so that nothing falls towards the edge of a band or a wall."""
+    for r in prange(start.size):
+        for I in range(start[r], start[r] + n):
+            gx, gy = 0.5 * (d[I + s[0]] - d[I - s[0]]) / h, 0.5 * (d[I + s[1]] - d[I - s[1]]) / h
+            g, there = gx * gx + gy * gy, ends[1]
+            if g > FLAT:
+                far = d[I] / (h * g)
+                x, y = around(I // s[0] - far * gx, box[0], joined[0]), around(I % s[0] - far * gy, box[1], joined[1])
+                there = at2(stretch, s, box, x, y)
+            out[I] = d[I] * beyond(there, d[I], ends, reach)
+
+
+@loop
+def stretched_3d(out, d, stretch, start, n, s, box, joined, ends, reach, h):
+    """As `stretched_2d`."""
+    for r in prange(start.size):
+        for I in range(start[r], start[r] + n):
+            gx, gy = 0.5 * (d[I + s[0]] - d[I - s[0]]) / h, 0.5 * (d[I + s[1]] - d[I - s[1]]) / h
+            gz = 0.5 * (d[I + s[2]] - d[I - s[2]]) / h
+            g, there = gx * gx + gy * gy + gz * gz, ends[1]
+            if g > FLAT:
+                far = d[I] / (h * g)
+                x = around(I // s[0] - far * gx, box[0], joined[0])
+                y = around(I % s[0] // s[1] - far * gy, box[1], joined[1])
+                z = around(I % s[1] - far * gz, box[2], joined[2])
+                there = at3(stretch, s, box, x, y, z)
+            out[I] = d[I] * beyond(there, d[I], ends, reach)
