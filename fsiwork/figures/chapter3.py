@@ -78,17 +78,22 @@ def fig_3_10(datasets: Datasets, measured: Measured) -> Figure:
         step = max(1, t.size // 400)
         right.plot(t[1::step], np.maximum(deviation[1::step], 1e-6), color=colour, linewidth=1.1)
         worst = measured[f"volume_deviation_{n}"]
-        place, side = ((0, -3), "top") if n == cells[-1] else ((0, 3), "bottom")
-        at = int(t.size * (0.99 if cells.index(n) % 2 else 0.68))
-        right.annotate(f"N = {n}: {worst:.2g} %", (t[at], deviation[at]), place, color=colour,
-                       textcoords="offset points", fontsize=8, ha="right", va=side)  # fmt: skip
+        right.annotate(f"N = {n}: {worst:.2g} %", (t[-1], deviation[-1]), (0, -4), color=colour,
+                       textcoords="offset points", fontsize=8, ha="right", va="top")  # fmt: skip
+    own = datasets["drop_stabilised"]
+    for n in sorted(int(n) for n in own["cells"].values):
+        t, volume = history(own, "geometric_volume", cells=n)
+        deviation, colour = 100 * np.abs(volume / volume[0] - 1), style.shades(len(cells))[cells.index(n)]
+        every = max(1, t.size // 400)
+        right.plot(t[1::every], np.maximum(deviation[1::every], 1e-6), ":", color=colour, linewidth=1.1)
     for percent, n in ((1.5, 64), (0.1, 512)):
         right.axhline(percent, **style.REFERENCE)
         right.text(0.03, percent, f"book, N = {n}: {percent:g} %", fontsize=8, va="bottom", color="0.3",
                    transform=right.get_yaxis_transform())  # fmt: skip
     right.set(yscale="log", ylim=(1e-4, 5), xlabel=TIME, ylabel="|volume / first volume − 1| [%]")
     right.set_title("Volume: largest deviation by grid")
-    text = f"last refinement: first minimum {measured['amplitude_difference']:.2g} % of the amplitude"
+    text = f"last refinement: first minimum {measured['amplitude_difference']:.2g} % of the amplitude  ·  stabilised "
+    text += ", ".join(f"{measured[f'volume_stabilised_{int(n)}']:.2g} %" for n in own["cells"].values)
     style.note(figure, datasets, text)
     return figure
 
@@ -155,9 +160,9 @@ def fig_3_12(datasets: Datasets, measured: Measured) -> Figure:
                 look = {**style.COUPLING[coupling], "markersize": 4}
                 _half_axes(ax, runs, f"{coupling}, Δt = {dt:.2g}", look, 12, case=case, width=width)
             style.band(ax, membranes.RADIUS, 0.005 * membranes.RADIUS)
-            book, own = (measured[f"{name}_difference_{n}{tail}"] for name in ("amplitude", "stabilised"))
+            book, own = (measured[f"{name}_amplitude_error_{n}{tail}"] for name in ("semi_implicit", "stabilised"))
             ax.set(title=f"N = {n}, ε = {width:g} Δx", ylim=(0.48, 0.86))
-            words = "first minimum against the explicit scheme,\n% of amplitude: "
+            words = "first extremes against the explicit scheme,\n% of amplitude: "
             words += f"{book:.2g} semi-implicit, {own:.2g} stabilised"
             ax.text(0.98, 0.03, words, transform=ax.transAxes, fontsize=8, ha="right")
             ax.legend(loc="upper right")
