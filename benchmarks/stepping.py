@@ -1,4 +1,4 @@
-"""Flow and membrane: cell-steps a second, each stage of a step, the share of Python, memory allocated by a step.
+"""Flow and membranes: cell-steps a second, each stage of a step, the share of Python, memory allocated by a step.
 
 A share of the bandwidth counts only what any program must move: every field that a stage reads, once, and every field
 that it writes, once, whatever the number of passes the stage takes.
@@ -8,13 +8,16 @@ import sys
 import tracemalloc
 
 import numpy as np
+import psutil
 
 from benchmarks.rows import Row, row
 from benchmarks.timing import least, triad
+from fsiwork.bodies.shear import ShearMembrane
 from fsiwork.scene import Scene
 from fsiwork.simulate import Simulation, build, step
 
 RATE = "million cell-steps/s"
+SHEARED_STEP = 0.24  # Δt of fig_3_18 times its cells a side
 SMALL = 3072  # bytes of Python's and Numba's objects between two calls: less than another row of 512 cells
 
 
@@ -51,6 +54,25 @@ def membrane(n: int, dim: int) -> Simulation:
     return build(Scene.model_validate(scene))
 
 
+def sheared(n: int) -> Simulation:
+    """The sphere of Sec. 3.6.2 on n³ cells as `fig_3_18` has it, ε = 0.11 or one cell, its map by linear upwinding."""
+    body = {
+        "kind": "shear-membrane",
+        "shape": {"kind": "ball", "centre": [0.0] * 3, "radius": 0.5},
+        "area": 1.0,
+        "shear": 1.0,
+        "width": {"length": max(0.11, 2.0 / n)},
+        "twist": np.pi,
+    }
+    scene = {
+        "box": {"length": [2.0] * 3, "cells": n, "origin": [-1.0] * 3, "edges": "walls"},
+        "fluid": {"viscosity": 0.01},
+        "bodies": [body],
+        "clock": {"end": 9.0, "step": SHEARED_STEP / n, "frames": 1},
+    }
+    return build(Scene.model_validate(scene))
+
+
 def _swirl(sim: Simulation) -> None:
     """u = sin(πx/2) cos(πy/2), v = -cos(πx/2) sin(πy/2), in the plane of the first two directions."""
     g, q = sim.flow.grid, np.pi / 2.0
@@ -77,16 +99,21 @@ def verbs(sim: Simulation) -> dict:
     return {"push": push, "predict": lambda: flow.predict(dt), "project": lambda: flow.project(dt), "move": move}
 
 
-def fields_moved(dim: int) -> dict[str, int]:
-    """Fields that a stage must read or write: old terms of advection twice; a pressure and the one before."""
-    return {"push": 1 + dim, "predict": 4 * dim + 1, "project": 2 * dim + 3, "move": dim + 2}
+def fields_moved(dim: int, sheared: bool = False) -> dict[str, int]:
+    """Fields that a stage must read or write: old terms of advection twice; a pressure and the one before. A membrane
+    with shear reads Y and the velocity, which says what is upwind, for its force, and carries all of Y."""
+    push, move = (3 * dim, 3 * dim) if sheared else (1 + dim, dim + 2)
+    return {"push": push, "predict": 4 * dim + 1, "project": 2 * dim + 3, "move": move}
+
+
+def _moved(sim: Simulation) -> dict[str, int]:
+    return fields_moved(sim.flow.grid.dim, any(isinstance(body, ShearMembrane) for body in sim.bodies))
 
 
 def rate(name: str, sim: Simulation, mark: str, seconds: float = 2.0) -> Row:
     """Million cell-steps a second of the whole `step`."""
-    cells, dim = sim.flow.grid.cells, sim.flow.grid.dim
+    cells, moved = sim.flow.grid.cells, _moved(sim)
     took = least({"step": lambda: step(sim.flow, sim.bodies, sim.dt)}, seconds)["step"]
-    moved = fields_moved(dim)
     count = sum(moved.values()) if sim.bodies else moved["predict"] + moved["project"]
     roof = triad(cells) / (8 * count) * 1e-6
     per_second = cells / took * 1e-6
@@ -96,7 +123,7 @@ def rate(name: str, sim: Simulation, mark: str, seconds: float = 2.0) -> Row:
 def stages(name: str, sim: Simulation, seconds: float = 4.0) -> list[Row]:
     """Time per cell of each stage."""
     cells = sim.flow.grid.cells
-    took, moved = least(verbs(sim), seconds), fields_moved(sim.flow.grid.dim)
+    took, moved = least(verbs(sim), seconds), _moved(sim)
     total, rows = sum(took.values()), []
     for verb, t in took.items():
         roof = 8 * moved[verb] / triad(cells) * 1e9
@@ -104,6 +131,40 @@ def stages(name: str, sim: Simulation, seconds: float = 4.0) -> list[Row]:
         note = f"{100 * t / total:.0f} % of the step"
         rows.append(row(f"{name}_{verb}", ns, "ns a cell", against=("bandwidth", roof), share=roof / ns, note=note))
     return rows
+
+
+def sheared_step(name: str, n: int, seconds: float = 3.0) -> Row:
+    """Seconds of a step of the sheared sphere; the note has the whole run to t = 9, with its looks at det ∇Y."""
+    sim = sheared(n)
+    flow, bodies, cells = sim.flow, sim.bodies, sim.flow.grid.cells
+    took = least({"step": lambda: step(flow, bodies, sim.dt), "survey": bodies[0].survey}, seconds)
+    roof = 8 * sum(_moved(sim).values()) * cells / triad(cells)
+    run = sim.total * sum(took.values()) / 60
+    note = (
+        f"{took['step'] / cells * 1e9:.0f} ns a cell; fig_3_18 at {n}³ to t = 9: {sim.total} steps, {run:.2g} minutes"
+    )
+    against = ("bandwidth", roof)
+    return row(name, took["step"], "s a step", against=against, share=roof / took["step"], note=note)
+
+
+def sheared_bytes(n: int = 96) -> Row:
+    """Memory of the sheared sphere on n³ cells [byte a cell], beside what has to be kept from step to step: velocity,
+    its last advection, pressure and the one before, Y."""
+    _resident(24)  # compiles
+    used, sim = _resident(n)
+    kept = 8 * (3 * sim.flow.grid.dim + 2)
+    note = f"{n}³, ghosts included; {used / 8:.0f} fields where the state is {kept // 8}"
+    return row("shear_bytes", used, "byte a cell", against=("state", kept), note=note)
+
+
+def _resident(n: int) -> tuple[float, Simulation]:
+    """Bytes a cell that the process grows by to hold the sheared sphere and to step it."""
+    process = psutil.Process()
+    before = process.memory_info().rss
+    sim = sheared(n)
+    for _ in range(2):
+        step(sim.flow, sim.bodies, sim.dt)
+    return (process.memory_info().rss - before) / sim.flow.grid.cells, sim
 
 
 def python_share(n: int = 512, seconds: float = 2.0) -> Row:

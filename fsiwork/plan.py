@@ -195,9 +195,9 @@ def _solvers(scene: Scene, step: float) -> list[tuple[str, str, float]]:
     if variable and alpha > 0.0:
         found.append(("diffusion", "multigrid", 16.0 * dim))
     elif stabilised or alpha > 4.0:
-        found.append(("diffusion", "direct", 2.0 * dim))
+        found.append(("diffusion", "direct", 1.0 * dim))
     elif alpha > 0.0:
-        found.append(("diffusion", "lines", 1.0 * dim))
+        found.append(("diffusion", "lines", 0.0))
     for i, body in membranes:
         if body.coupling == "semi-implicit":
             found.append((f"body {i}: prediction of φ", "direct", 1.5))

@@ -46,15 +46,27 @@ def test_flow_and_stages_give_rows(dim):
     assert sum(float(r["note"].split()[0]) for r in found) == pytest.approx(100, abs=3)
 
 
-def test_stages_are_the_step():
-    one, other = stepping.membrane(16, 2), stepping.membrane(16, 2)
+@pytest.mark.parametrize("made", [lambda: stepping.membrane(16, 2), lambda: stepping.sheared(16)])
+def test_stages_are_the_step(made):
+    one, other = made(), made()
     for _ in range(3):
         stepping.step(one.flow, one.bodies, one.dt)
         for verb in stepping.verbs(other).values():
             verb()
     assert (one.flow.u[0] == other.flow.u[0]).all()
-    assert (one.bodies[0].phi == other.bodies[0].phi).all()
+    for name, q in one.bodies[0].fields().items():
+        assert (q == other.bodies[0].fields()[name]).all()
     assert abs(one.flow.u[0]).max() > 0
+
+
+def test_a_membrane_with_shear_gives_rows():
+    found = well_formed(stepping.sheared_step("shear", 16, seconds=0.01))
+    assert "600 steps" in found["note"]
+    shares = [well_formed(r) for r in stepping.stages("stage", stepping.sheared(16), seconds=0.01)]
+    assert sum(float(r["note"].split()[0]) for r in shares) == pytest.approx(100, abs=3)
+    used = well_formed(stepping.sheared_bytes(48))
+    assert used["reference"] == 88
+    assert 2 < used["ratio"] < 10
 
 
 def test_poisson_python_and_memory_give_rows():
@@ -155,6 +167,7 @@ def test_every_mark_of_the_suite_is_named(tmp_path):
     names = {"flow_2d", "flow_2d_implicit", "flow_3d", "membrane_2d", "poisson_2d", "stage_2d", "stage_3d"}
     assert set(command.suite(tmp_path)) == names | {
         "python_share", "allocation", "workflow_parse", "freefem", "cold_start", "fmm_full", "fmm_band", "fmm_3d",
+        "shear_3d", "shear_3d_128", "stage_shear", "shear_bytes",
         "weno_2d", "weno_3d", "upwind5_2d", "threads", "band", "geometric_length",
     }  # fmt: skip
 

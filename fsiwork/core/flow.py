@@ -7,6 +7,8 @@ explicit) and, if ρ varies, the projection; but where μ alone varies, up to `L
 bending, the whole stress 2μD(u) is explicit and the implicit part keeps constant coefficients, those of the largest μ.
 """
 
+import math
+
 import numpy as np
 
 from fsiwork.core.edges import Edges
@@ -209,7 +211,7 @@ class Flow:
     def _implicit_part(self, c: int, kappa: float) -> None:
         """u* = u + (1 - κΔ + βΔ²)⁻¹ increment, on the faces inside; β = c_b Δt² of bodies that resist bending."""
         start, n, shape = self._rows[c]
-        d = self._compact(c, shape)
+        d = self._minus_div.reshape(-1)[: math.prod(shape)].reshape(shape)  # room that only `project` needs
         beta = self.bending_stiffness * self.dt**2
         if self.guess is not None:
             pull = -self.stiffness * (self.dt / self.grid.h) ** 2
@@ -273,12 +275,6 @@ class Flow:
         for index, s in zip(first[:-1], g.strides[:-1], strict=True):
             start = np.add.outer(start, index * s)
         return np.ascontiguousarray(start.ravel() + first[-1][0]), first[-1].size, tuple(x.size for x in first)
-
-    def _compact(self, c, shape):
-        key = ("compact", c)
-        if key not in self._solvers:
-            self._solvers[key] = np.zeros(shape)
-        return self._solvers[key]
 
     def _solver(self, kind: str, c: int = 0, shape=None):
         """Solvers are planned at first use and kept."""
