@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 
 from fsiwork import scene
+from fsiwork.figures import energy as energy_figure
 from fsiwork.figures import flows, style
 from fsiwork.studies import convergence, energy, exact, modes, tradeoff
 
@@ -168,7 +169,16 @@ def budget(time=1.0, space=1.0, total=0.02, ended="complete"):
         "energy_grids": runs({"dirac": ["plain", "renormalised"], "cells": CELLS}, [0.1 * grid, 0.05 + 0.1 * grid]),
         "energy_bodies_membrane": runs({}, -total, ended=ended),
         "energy_bodies_drop": runs({}, total, "oscillating_drop"),
+        "energy_of_ring": parts(steps[:2], time, space),
+        "energy_of_drop_3d": parts(steps[:2], 1.0, 2.0),
     }
+
+
+def parts(steps, time, space):
+    """A scene's parts of the residual, falling with these orders, on 24 and 48 cells."""
+    data = {"steps": ("halving", steps), "of_step": ("halving", 9 * steps**time)}
+    data |= {"sides": ("level", [24.0, 48.0]), "of_grid": ("level", [0.1, 0.1 * 0.5**space])}
+    return xr.Dataset(data).assign(n_cells=48.0)
 
 
 def test_parts_of_the_energy_residual_are_told_apart():
@@ -179,6 +189,8 @@ def test_parts_of_the_energy_residual_are_told_apart():
     assert found["rest_renormalised"] == pytest.approx(0.075, rel=1e-5)
     assert [found["total_membrane"], found["total_drop"]] == pytest.approx([0.02, 0.02], rel=1e-5)
     assert found["step_largest"] == pytest.approx(0.002, rel=1e-5)
+    assert [found["scenes_order_step"], found["scenes_order_grid"]] == pytest.approx([1.0, 1.0])
+    assert [found["order_grid_drop_3d"], found["scenes_rest"]] == pytest.approx([2.0, 0.05])
 
 
 def test_a_residual_that_does_not_fall_shows():
@@ -187,6 +199,8 @@ def test_a_residual_that_does_not_fall_shows():
     assert found["order_grid"] < 0.9
     assert found["total_membrane"] > 0.15
     assert found["total_drop"] > 0.15
+    assert found["scenes_order_step"] == pytest.approx(0.5)
+    assert found["scenes_order_grid"] == pytest.approx(0.1)
     assert math.isnan(energy.measure(budget(ended="diverged at t=0.1"))["total_membrane"])
 
 
@@ -272,7 +286,8 @@ def test_figures_of_made_up_data_are_drawn(tmp_path):
         "tradeoff_membrane": (grid_of_runs(), tradeoff.measure),
     }
     for name, (data, measure) in made.items():
-        path = style.save(getattr(flows, name)(data, measure(data)), tmp_path / f"{name}.png")
+        module = energy_figure if name == "energy_law" else flows
+        path = style.save(getattr(module, name)(data, measure(data)), tmp_path / f"{name}.png")
         assert 5_000 < path.stat().st_size <= 150_000
 
 

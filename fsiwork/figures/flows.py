@@ -1,4 +1,4 @@
-"""Figures of the flow solver and of the balance of error, energy and cost (Chapter 3)."""
+"""Figures of the flow solver, of small oscillations, and of the balance of error and cost (Chapter 3)."""
 
 import math
 from collections.abc import Mapping
@@ -8,7 +8,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from fsiwork.figures import style
-from fsiwork.studies import energy, modes, tradeoff
+from fsiwork.studies import modes, tradeoff
 
 Datasets, Measured = Mapping[str, xr.Dataset], Mapping[str, float]
 
@@ -112,57 +112,6 @@ def _drawn(times, values, fitted, mode) -> np.ndarray:
     rest, a, b = np.linalg.lstsq(basis, values, rcond=None)[0]
     other = np.exp((1j * mode.omega - mode.gamma) * late)
     return rest + a * other.real + b * other.imag
-
-
-def energy_law(datasets: Datasets, measured: Measured) -> Figure:
-    """Total residual of (3.23) over Δt and over Δx, and its growth in time for membrane and drop."""
-    figure, (left, middle, right) = style.sheet(1, 3, size=(11.4, 3.5))
-    _energy_steps(left, energy.totals(datasets["energy_steps"]).sortby("step"), measured)
-    _energy_grids(middle, energy.totals(datasets["energy_grids"]).sortby("cells"), measured)
-    for k, name in enumerate(("membrane", "drop")):
-        data = datasets[f"energy_bodies_{name}"]
-        sums = energy.residuals(data).cumsum("row")
-        label = f"{name}: {measured[f'total_{name}']:.3f} at the end"
-        right.plot(data["t_step"], sums, color=style.OKABE_ITO[k], linestyle=("-", "--")[k], label=label)
-    for sign in (-1, 1):
-        right.axhline(0.15 * sign, **style.REFERENCE)
-    cells = int(datasets["energy_bodies_drop"]["n_cells"])
-    right.set(title=f"Sum over time, {cells}² cells, ε = 6 Δx", xlabel="time", ylim=(-0.2, 0.26))
-    right.set_ylabel("sum of residuals / excess energy")
-    right.legend(loc="upper right")
-    style.note(figure, datasets, f"largest residual of one step: {measured['step_largest']:.1e} of the excess energy")
-    return figure
-
-
-def _energy_steps(ax, total: xr.DataArray, measured: Measured) -> None:
-    """Differences of successive totals: what the larger of two steps adds."""
-    steps, change = total["step"].values[1:], np.abs(np.diff(total.values))
-    label = f"order ≥ {measured['order_step']:.2f}"
-    ax.plot(steps, change, color=style.OKABE_ITO[0], marker="s", label=label)
-    ax.plot(steps, change[-1] * steps / steps[-1], label="order 1", **style.REFERENCE)
-    ax.set(xscale="log", yscale="log", xlabel="Δt", title="Part of the time step")
-    ax.set_ylabel("|total(Δt) − total(Δt/2)| / excess")
-    ax.set_xticks(steps, [f"{q:.3g}" for q in steps])
-    ax.minorticks_off()
-    ax.legend(loc="upper left")
-
-
-def _energy_grids(ax, total: xr.DataArray, measured: Measured) -> None:
-    cells = total["cells"].values.astype(float)
-    labels = {"plain": f"plain D: order ≥ {measured['order_grid']:.2f}", "renormalised": "renormalised D"}
-    for k, (dirac, label) in enumerate(labels.items()):
-        values = abs(total.sel(dirac=dirac)).values
-        look = {"color": style.OKABE_ITO[k], "marker": "so"[k], "linestyle": ("-", "--")[k]}
-        ax.plot(cells, values, label=label, **look)
-    first = float(abs(total.sel(dirac="plain"))[0])
-    ax.plot(cells, first * cells[0] / cells, label="order 1", **style.REFERENCE)
-    ax.set(xscale="log", yscale="log", xlabel="cells along a side", title="Grid, ε fixed in length")
-    ax.set_ylabel("|total residual| / excess")
-    ax.set_xticks(cells, [f"{q:.0f}" for q in cells])
-    ax.minorticks_off()
-    low, high = ax.get_ylim()
-    ax.set_ylim(low, 6 * high)
-    ax.legend(loc="upper right")
 
 
 def tradeoff_membrane(datasets: Datasets, measured: Measured) -> Figure:

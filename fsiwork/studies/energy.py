@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from fsiwork import scene as scenes
-from fsiwork.studies import orders
+from fsiwork.studies import balance, orders
 from fsiwork.studies.stability import releasable
 
 
@@ -64,7 +64,7 @@ def measure(datasets: dict[str, xr.Dataset]) -> dict[str, float]:
     The order in Δx is that of the plain Dirac function, whose force is the derivative of its energy: all of its
     residual belongs to the grid. ``rest_renormalised`` is what the renormalised one keeps on the finest grid (ε fixed):
     its energy is not exactly the one whose derivative the force is; ``order_grid_renormalised`` is the order of its
-    differences between grids.
+    differences between grids. Beside them stand the numbers of `balance.measure` for every scene.
     """
     steps, grids = totals(datasets["energy_steps"]), totals(datasets["energy_grids"])
     bodies = {name: datasets[f"energy_bodies_{name}"] for name in ("membrane", "drop")}
@@ -78,4 +78,4 @@ def measure(datasets: dict[str, xr.Dataset]) -> dict[str, float]:
     }
     found |= {f"total_{name}": float(abs(totals(data))) for name, data in bodies.items()}
     largest = [float(abs(residuals(data)).max(skipna=False)) for data in bodies.values()]
-    return found | {"step_largest": float(np.max(largest))}
+    return found | {"step_largest": float(np.max(largest))} | balance.measure(datasets)
