@@ -78,8 +78,9 @@ def fig_3_10(datasets: Datasets, measured: Measured) -> Figure:
         step = max(1, t.size // 400)
         right.plot(t[1::step], np.maximum(deviation[1::step], 1e-6), color=colour, linewidth=1.1)
         worst = measured[f"volume_deviation_{n}"]
-        right.annotate(f"N = {n}: {worst:.2g} %", (t[-1], deviation[-1]), (0, -4), color=colour,
-                       textcoords="offset points", fontsize=8, ha="right", va="top")  # fmt: skip
+        place, side = ((0, 4), "bottom") if n == cells[-1] else ((0, -4), "top")
+        right.annotate(f"N = {n}: {worst:.2g} %", (t[-1], deviation[-1]), place, color=colour,
+                       textcoords="offset points", fontsize=8, ha="right", va=side)  # fmt: skip
     own = datasets["drop_stabilised"]
     for n in sorted(int(n) for n in own["cells"].values):
         t, volume = history(own, "geometric_volume", cells=n)
@@ -92,7 +93,7 @@ def fig_3_10(datasets: Datasets, measured: Measured) -> Figure:
                    transform=right.get_yaxis_transform())  # fmt: skip
     right.set(yscale="log", ylim=(1e-4, 5), xlabel=TIME, ylabel="|volume / first volume − 1| [%]")
     right.set_title("Volume: largest deviation by grid")
-    text = f"last refinement: first minimum {measured['amplitude_difference']:.2g} % of the amplitude  ·  stabilised "
+    text = f"last refinement: {measured['amplitude_difference']:.2g} % of the amplitude  ·  stabilised (dotted): "
     text += ", ".join(f"{measured[f'volume_stabilised_{int(n)}']:.2g} %" for n in own["cells"].values)
     style.note(figure, datasets, text)
     return figure
