@@ -58,6 +58,7 @@ def _membrane(spec, grid: Grid, edges: Edges) -> Membrane:
         dirac=spec.dirac,
         coupling=spec.coupling,
         carry=spec.transport.carry,
+        restart=np.inf if spec.transport.restart is None else spec.transport.restart,
         inside=None if spec.inside is None else (spec.inside.density, spec.inside.viscosity),
         surface_mass=spec.surface_mass,
         bending=spec.bending,

@@ -199,6 +199,10 @@ class Scene(Spec):
             misfits = list(shape.misfits(self.box.dim))
             for path, text in misfits or _outside(shape, self.box):
                 yield ("bodies", i, *where, *path), text
+        restarts = isinstance(body, Membrane) and body.transport.restart
+        if restarts and any(side.kind == "inflow" for pair in self.box.sides for side in pair):
+            fault = "needs a box without inflow: φ₀ would have to reach beyond it"
+            yield ("bodies", i, "transport", "restart"), fault
 
     @property
     def _periodic(self) -> str:

@@ -1,11 +1,13 @@
 """The backward map Y: where a point's material was at first; ∂t Y + u·∇Y = 0, Y(x, 0) = x."""
 
 import copy
+from collections.abc import Callable
 
 import numpy as np
 
 from fsiwork.core.edges import Edges
 from fsiwork.core.grid import GHOSTS, Grid
+from fsiwork.core.kernels import sampling
 from fsiwork.core.transport import Transport
 
 
@@ -21,12 +23,18 @@ class BackwardMap:
 
     def __init__(self, grid: Grid, edges: Edges, transport: Transport):
         self.grid, self.edges = grid, edges
-        self.Y = [grid.sample(lambda *x, a=a: x[a], dtype=transport.dtype) for a in grid.axes]
+        self.Y = [grid.field(transport.dtype) for _ in grid.axes]
+        self.begin()
         self._carriers = []
         for a in grid.axes:
             carrier = copy.copy(transport)
             carrier.edges = _Growing(edges, a)
             self._carriers.append(carrier)
+
+    def begin(self) -> None:
+        """Y = x."""
+        for a, Y in enumerate(self.Y):
+            Y[:] = self.grid.sample(lambda *x, a=a: x[a], dtype=Y.dtype)
 
     def move(self, u: list[np.ndarray], dt: float) -> None:
         """Carry Y over dt with the face velocity ``u``."""
@@ -40,6 +48,61 @@ class BackwardMap:
             if self.edges.periodic(a):
                 padded[a] = np.mod(padded[a] - g.origin[a], g.length[a]) + g.origin[a]
         return padded
+
+
+class Rest:
+    """φ₀ of a map: a function, until the map is wound up and starts anew, φ₀ ← φ and Y ← x; from then on a field, with
+    quintics between its points. Layers that turn at different speeds wind Y up without end, though φ hardly changes.
+
+    Parameters
+    ----------
+    map : the backward map
+    function : φ₀(x, y[, z]) at t = 0, of padded arrays
+    restart : largest |∂_jY_i| near the interface before the map starts anew; inf: never
+    """
+
+    def __init__(self, map: BackwardMap, function: Callable, restart: float = np.inf):
+        self.map, self.function, self.restart = map, function, float(restart)
+        self.often = np.zeros(1)  # how often it has started anew
+        if self.restart < np.inf:
+            g = map.grid
+            self._phi0, self._s, self._box = g.field(map.Y[0].dtype), np.array(g.strides), np.array(g.n)
+            self._low = GHOSTS - 0.5 - np.array(g.origin[: g.dim]) / g.h
+            self._sample = getattr(sampling, f"sample_{g.dim}d")
+
+    def level(self, phi: np.ndarray) -> None:
+        """φ = φ₀(Y), flat; its ghosts are filled."""
+        g, home = self.map.grid, self.map.home()
+        if self.often[0]:
+            places = [np.ravel(q) for q in home]
+            self._sample(phi, self._phi0, *places, *g.rows(), self._s, self._box, self._low, g.h)
+        else:
+            g.padded(phi)[...] = self.function(*home)
+        self.map.edges.fill_scalar(phi, "linear")
+
+    def wound(self, runs: np.ndarray) -> bool:
+        """Whether Y is wound up on the ``runs`` of a band."""
+        top = np.zeros(runs.shape[0])
+        for Y in self.map.Y:
+            sampling.steepest(top, Y, runs, self._s, 0.5 / self.map.grid.h)
+            if top.max(initial=0.0) > self.restart:
+                return True
+        return False
+
+    def begin(self, phi: np.ndarray) -> None:
+        """Start anew: φ₀ ← φ, flat with its ghosts, and Y ← x."""
+        self._phi0[:] = phi
+        self.often += 1
+        self.map.begin()
+
+    def state(self) -> dict[str, np.ndarray]:
+        """φ₀ of a map that may start anew, and how often it did."""
+        return {"rest": self._phi0.copy(), "often": self.often.copy()} if self.restart < np.inf else {}
+
+    def put_back(self, state: dict[str, np.ndarray]) -> None:
+        """Take back a `state`."""
+        if self.restart < np.inf:
+            self._phi0[:], self.often[:] = state["rest"], state["often"]
 
 
 class _Growing:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fsiwork.bodies.backward import BackwardMap
+from fsiwork.bodies.backward import BackwardMap, Rest
 from fsiwork.bodies.band import Band
 from fsiwork.bodies.bending import Bending
 from fsiwork.bodies.body import Body
@@ -44,10 +44,12 @@ class Membrane(Body):
         renormalised
     coupling : ``explicit`` (3.59), ``semi-implicit`` (3.62)-(3.64), ``stabilised``, ``iterated``
     carry : ``field`` (φ) or ``map`` (the backward map Y, and φ = stretch · distance(Y)); a map needs a distance
+    restart : of a map, see `backward.Rest`; Y is then that of the time since it started anew
     inside : density and viscosity inside, if they differ from the fluid's
     surface_mass : mass per rest area
     bending : modulus k of ½kH² [energy]; (3.2.4), see `bodies.bending`
-    renew : moves of φ after which the lines φ = c beside the interface are drawn anew, see `bodies.layers`; 0: never
+    renew : moves of φ, or restarts of a map, after which the lines φ = c beside the interface are drawn anew, see
+        `bodies.layers`; 0: never
 
     Attributes
     ----------
@@ -75,12 +77,13 @@ class Membrane(Body):
         dirac: str = "auto",
         coupling: str = "explicit",
         carry: str = "field",
+        restart: float = np.inf,
         inside: tuple[float, float] | None = None,
         surface_mass: float = 0.0,
         bending: float = 0.0,
         renew: int = 0,
     ):
-        self._check(phi0, dirac, coupling, carry, renew)
+        self._check(phi0, dirac, coupling, carry, renew and restart == np.inf)
         self.grid, self.edges, self.transport, self.eps = grid, edges, transport, float(eps)
         self.coupling, self.inside, self.surface_mass = coupling, inside, float(surface_mass)
         self._law = AtPoints(law, grid)
@@ -93,8 +96,10 @@ class Membrane(Body):
         self._distance, self._stretch = phi0, float(stretch)
         self.phi = grid.field(transport.dtype)
         self.map = BackwardMap(grid, edges, transport) if carry == "map" else None
+        self._rest = Rest(self.map, self._from_distance, restart) if self.map else None
         if callable(phi0):
-            self._from_distance(self.map.home() if self.map else grid.points())
+            grid.padded(self.phi)[...] = self._from_distance(*grid.points())
+            edges.fill_scalar(self.phi, "linear")
         else:
             self.phi[:] = phi0
             edges.fill_scalar(self.phi, "linear")
@@ -134,11 +139,15 @@ class Membrane(Body):
         """Carry φ, or Y and then φ = φ₀(Y), with ``flow.u`` (3.64)."""
         if self.map:
             self.map.move(flow.u, dt)
-            self._from_distance(self.map.home())
+            self._rest.level(self.phi)
         else:
             self.transport.advance([self.phi], flow.u, dt, "linear")
             self._layers.moved(self.phi)
         self._fresh = False
+        if self.map and self._rest.restart < np.inf and self._rest.wound(self._band_now().inside):
+            self._layers.moved(self.phi)
+            self._rest.begin(self.phi)
+            self._fresh = False
 
     # --- answers ----------------------------------------------------------------------------------------------
     def explicit_limits(self, flow) -> dict[str, float]:
@@ -164,14 +173,17 @@ class Membrane(Body):
         return {"elastic, accuracy": often * min(limits.values())} | bent
 
     def state(self) -> dict[str, np.ndarray]:
-        """φ, and Y if it is carried; how often φ has moved if that counts."""
-        return {name: q.copy() for name, q in self._named().items()} | self._layers.state()
+        """φ, and Y if it is carried, with its rest; how often φ has moved if that counts."""
+        rest = self._rest.state() if self.map else {}
+        return {name: q.copy() for name, q in self._named().items()} | self._layers.state() | rest
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Take back a `state`."""
         for name, q in self._named().items():
             q[:] = state[name]
         self._layers.restore(state)
+        if self.map:
+            self._rest.put_back(state)
         self._fresh = False
 
     def fields(self) -> dict[str, np.ndarray]:
@@ -245,7 +257,7 @@ class Membrane(Body):
         if carry == "map" and not callable(phi0):
             raise ValueError("a map needs a distance (function of coordinates), not a field")
         if carry == "map" and renew:
-            raise ValueError("a map makes φ anew each step: nothing to renew")
+            raise ValueError("a map makes φ anew each step: nothing to renew without restart")
 
     def _plan(self):
         g = self.grid
@@ -259,9 +271,8 @@ class Membrane(Body):
         Y = self.map.Y if self.map else ()
         return {"phi": self.phi} | {f"Y_{XYZ[a]}": q for a, q in enumerate(Y)}
 
-    def _from_distance(self, x):
-        self.grid.padded(self.phi)[...] = self._stretch * self._distance(*x)
-        self.edges.fill_scalar(self.phi, "linear")
+    def _from_distance(self, *x):
+        return self._stretch * self._distance(*x)
 
     def _band_now(self) -> Band:
         if not self._fresh:

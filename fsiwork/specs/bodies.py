@@ -90,7 +90,8 @@ class Transport(Spec):
     """How the interface is carried: φ itself (field) or the backward map Y with φ = φ₀(Y) (map).
 
     ``band``: only so many cells on either side of it; φ is clipped beyond. ``from_interface``: with the velocity of the
-    nearest point of the interface, which keeps a distance a distance (1.5.1).
+    nearest point of the interface, which keeps a distance a distance (1.5.1). ``restart``: of a membrane's map; as soon
+    as |∂_jY_i| near the interface exceeds this, φ₀ ← φ and Y ← x.
     """
 
     scheme: Literal[
@@ -101,12 +102,18 @@ class Transport(Spec):
     from_interface: bool = False
     tableau: Literal["ssp-rk3", "ssp-rk2", "euler"] = "ssp-rk3"
     carry: Literal["field", "map"] = "field"
+    restart: Annotated[Positive, Field(gt=1)] | None = None
     dtype: Literal["float64", "float32"] = "float64"
 
     @sense
     def _band_of_a_field(self) -> Iterator[Fault]:
         if self.band and self.carry == "map":
             yield ("band",), "is for carry: field; a map is needed everywhere"
+
+    @sense
+    def _restart_of_a_map(self) -> Iterator[Fault]:
+        if self.restart and self.carry == "field":
+            yield ("restart",), "is for carry: map"
 
     @sense
     def _interface_of_a_field(self) -> Iterator[Fault]:
@@ -120,8 +127,8 @@ class Membrane(Spec):
 
     ``stretch`` is |∇φ₀|, the first ratio of current to rest area; ``surface_mass`` is per rest area; ``bending`` is the
     modulus k of the energy ½kH². ``form`` and ``dirac`` are chosen by the law unless an expert overrides them. After
-    ``renew`` steps (0: never) the lines φ = c beside the interface are drawn anew, at the distance to it times its
-    stretch: for membranes and drops that tank-tread.
+    ``renew`` steps, or restarts of a map (0: never), the lines φ = c beside the interface are drawn anew, at the
+    distance to it times its stretch: for membranes and drops that tank-tread.
     """
 
     kind: Literal["membrane"] = "membrane"
@@ -144,8 +151,8 @@ class Membrane(Spec):
             yield ("transport", "band"), "is for kind: interface; a membrane's |∇φ| is its stretch"
         if self.transport.from_interface:
             yield ("transport", "from_interface"), "is for bodies of kind interface"
-        if self.renew and self.transport.carry == "map":
-            yield ("renew",), "is for transport.carry: field; a map makes φ anew each step"
+        if self.renew and self.transport.carry == "map" and not self.transport.restart:
+            yield ("renew",), "is for transport.carry: field; a map makes φ anew each step, unless it has a restart"
         if self.bending and self.coupling == "iterated":
             yield ("coupling",), "with bending it must be explicit, semi-implicit or stabilised, got 'iterated'"
         if self.bending and self.coupling == "stabilised" and self.surface_mass:
@@ -215,6 +222,8 @@ class Bubbles(Spec):
             yield ("transport", "band"), "is for kind: interface"
         if self.transport.from_interface:
             yield ("transport", "from_interface"), "is for bodies of kind interface"
+        if self.transport.restart:
+            yield ("transport", "restart"), "is for bodies of kind membrane"
         for name in ("film", "keep_volume"):
             if getattr(self, name) and self.transport.carry == "map":
                 yield (name,), "needs transport.carry: field"
@@ -250,6 +259,8 @@ class Interface(Spec):
     def _field_to_redistance(self) -> Iterator[Fault]:
         if self.redistance and self.transport.carry == "map":
             yield ("redistance",), "is for transport.carry: field; a map makes φ anew each step"
+        if self.transport.restart:
+            yield ("transport", "restart"), "is for bodies of kind membrane"
 
 
 class Markers(Spec):
@@ -286,6 +297,8 @@ class Curve(Spec):
             yield ("transport", "band"), "is for kind: interface; |∇φ¹ × ∇φ²| is the stretch of a curve"
         if self.transport.from_interface:
             yield ("transport", "from_interface"), "is for bodies of kind interface"
+        if self.transport.restart:
+            yield ("transport", "restart"), "is for bodies of kind membrane"
 
 
 class ShearMembrane(Spec):
