@@ -140,6 +140,7 @@ def _shear_membrane(spec, grid: Grid, edges: Edges) -> ShearMembrane:
         spec.shear,
         spec.width.of(grid.h),
         volume=spec.volume,
+        slip=spec.slip,
         twist=spec.twist,
         inflation=spec.inflation,
         alike=spec.alike,

@@ -182,6 +182,15 @@ class Simulation:
         self._before = {"t": self.t, "total": total, "gain": gain}
         return row
 
+    def pressure(self) -> np.ndarray:
+        """Pressure of this moment, interior array, mean zero: that of the book's form of the forces, which leaves out
+        what is a gradient in the form in use (`Body.potential`)."""
+        p = self.flow.pressure()
+        for body in self.bodies:
+            extra = body.potential()
+            p = p if extra is None else p - extra
+        return p - p.mean()
+
     def fields(self, names: tuple[str, ...]) -> dict[str, tuple[int | None, np.ndarray]]:
         """Copies of the named fields (``u`` is the whole velocity) without ghosts."""
         g, flow, found = self.flow.grid, self.flow, {}
@@ -193,7 +202,7 @@ class Simulation:
                 a = velocity[name]
                 found[name] = a, g.inside(flow.u[a], None if flow.edges.periodic(a) else a).copy()
             elif name == "p":
-                found[name] = None, flow.pressure()
+                found[name] = None, self.pressure()
             elif name in ("rho", "mu"):
                 q = getattr(flow, name)
                 constant = flow.density if name == "rho" else flow.viscosity

@@ -4,7 +4,7 @@ import numpy as np
 
 
 class Body:
-    """Four verbs, called in this order in a step, and five answers. All empty here, so that absence costs nothing.
+    """Four verbs, called in this order in a step, and six answers. All empty here, so that absence costs nothing.
 
     ``flow`` is a `fsiwork.core.flow.Flow`; ``dt`` [time].
 
@@ -28,6 +28,10 @@ class Body:
 
     def move(self, flow, dt: float) -> None:
         """Carry the body with the new velocity (3.64), (4.29)."""
+
+    def potential(self) -> np.ndarray | None:
+        """What the flow's pressure has more than with the book's form of the force, interior array at centres, if the
+        form in use differs by a gradient; of a membrane after SPEC 5."""
 
     def longest_step(self, flow) -> dict[str, float]:
         """Largest stable time steps [time], by the name of what limits them."""

@@ -9,13 +9,15 @@ from fsiwork.bodies.inside import Inside
 from fsiwork.core.edges import Edges
 from fsiwork.core.grid import Grid
 from fsiwork.core.kernels import shear as kernels
+from fsiwork.core.kernels import shear_points as points
+from fsiwork.core.kernels import shear_survey as surveys
 from fsiwork.core.transport import Transport
 
 LAWS = {
-    "quadratic": kernels.QUADRATIC,
-    "linear": kernels.LINEAR,
-    "neo-hookean": kernels.NEO_HOOKEAN,
-    "skalak": kernels.SKALAK,
+    "quadratic": points.QUADRATIC,
+    "linear": points.LINEAR,
+    "neo-hookean": points.NEO_HOOKEAN,
+    "skalak": points.SKALAK,
 }
 LIMIT = 2.8  # explicit limit over Δx√(ρε/M) (MEASURED-coupling 6)
 COUPLINGS = ("explicit", "stabilised")
@@ -41,6 +43,9 @@ class ShearMembrane(Body):
     area, shear : λ₁, λ₂ [energy per area at rest]
     volume : κ [energy per area at rest] of ½κ(J₀ det ∇Y - 1)², which a flow without divergence leaves at 0: it holds
         against the transport's errors of det ∇Y, by which the discrete energy of a membrane under tension can fall
+    slip : κ_s [energy per area at rest] of ½κ_s tan²θ, θ the angle between n and the image of the normal at rest: the
+        layers of the band do not slide freely over each other, as they do by SPEC 7, where the middle ones bear all of
+        the force; the band becomes a shell, whose resistance to bending goes with ε²
     eps : half-width ε of the plain D_ε, in lengths at rest
     twist : t₀ of (3.67) [angle/length], about the axis through the centre along z
     inflation : radius at t = 0 over that at rest; J₀ is its cube
@@ -60,7 +65,7 @@ class ShearMembrane(Body):
 
     def __init__(
         self, grid: Grid, edges: Edges, centre, radius: float, law: str, area: float, shear: float, eps: float,
-        *, volume: float = 0.0, twist: float = 0.0, inflation: float = 1.0, alike: bool = False,
+        *, volume: float = 0.0, slip: float = 0.0, twist: float = 0.0, inflation: float = 1.0, alike: bool = False,
         coupling: str = "explicit",
     ):  # fmt: skip
         if grid.dim != 3:
@@ -76,7 +81,9 @@ class ShearMembrane(Body):
         self._held = np.zeros(2)  # M of the stabiliser, and the steps since it was looked at
         self._rest = float(radius) / self.inflation
         self._centre = np.array(centre, float)
-        self._numbers = np.array([grid.h, self.eps, self._rest, self.weight, float(area), float(shear), float(volume)])
+        self._numbers = np.array(
+            [grid.h, self.eps, self._rest, self.weight, float(area), float(shear), float(volume), float(slip)]
+        )
         self._period = np.array([grid.length[a] if edges.periodic(a) else 0.0 for a in grid.axes])
         self.map = BackwardMap(grid, edges, Transport(grid, edges, "upwind5", centring=2))
         if twist or inflation != 1.0:
@@ -116,10 +123,22 @@ class ShearMembrane(Body):
         kernels.gradients(*self._g, self._P, band.runs, self._s, self.grid.h)
         return self._g
 
+    def potential(self) -> np.ndarray:
+        """D_ε(E + n·Tn), filtered as the force is: of the force, which is ∇(D_ε E) + div(D_ε T), the part that is a
+        gradient. Without it the pressure is that of SPEC 7, div(ΣE_i'Z_iC_iD_ε) alone."""
+        g, band, (x, y, z) = self.grid, self._band_now(), self.grid.strides
+        nodes, q = g.field(), g.field()
+        surveys.densities(nodes, *self.map.Y, band.runs, self._s, self._numbers, self._law, self._centre, self._period)
+        m = g.size - x - y - z
+        q[:m] = 0.125 * sum(nodes[k : k + m] for k in (0, x, y, z, x + y, x + z, y + z, x + y + z))
+        self.edges.fill_scalar(q, "mirror")
+        kernels.smooth(self._q, q, *g.rows(), x, y, 0.0)
+        return g.inside(self._q).copy()
+
     def longest_step(self, flow) -> dict[str, float]:
         """2.8 Δx √(ρε/M), M the largest modulus of small waves over the band; of the stabilised coupling, for which
         no limit is known, ε √(ρε/M)."""
-        top = float(self.survey()[kernels.STIFF])
+        top = float(self.survey()[surveys.STIFF])
         name, length = "elastic, shear", LIMIT * self.grid.h
         if self.coupling == "stabilised":
             name, length = "elastic, shear, accuracy", IN_TIME * self.eps
@@ -149,29 +168,29 @@ class ShearMembrane(Body):
         J₀ det ∇Y - 1 (``rms_box``, ``rms_surface``)."""
         values, g = self.survey(), self.grid
         volume, centre = self._inside.volume(self.phi, self._band)
-        out = {"volume": volume, "area": float(values[kernels.AREA]), "elastic_energy": float(values[kernels.ENERGY])}
+        out = {"volume": volume, "area": float(values[surveys.AREA]), "elastic_energy": float(values[surveys.ENERGY])}
         for a in g.axes:
             out[f"centroid_{XYZ[a]}"] = centre[a]
             out[f"axis_{XYZ[a]}"] = self._inside.half_extent(self.phi, centre, a) if volume > 0.0 else 0.0
-        names = {"Z1_min": kernels.LEAST1, "Z1_max": kernels.MOST1, "Z2_min": kernels.LEAST2, "Z2_max": kernels.MOST2}
-        out |= {name: float(values[k]) for name, k in names.items()} | {"det_min": float(values[kernels.LEAST_DET])}
-        area = values[kernels.AREA] or np.nan
-        out["shear_mean"] = float(values[kernels.SHEARED] / area)
-        out["rms_surface"] = float(np.sqrt(values[kernels.SQUARES] / area))
-        kernels.determinants(self._row, *self.map.Y, *g.rows(), *g.strides[:2], g.h, self.weight)
+        names = {"Z1_min": surveys.LEAST1, "Z1_max": surveys.MOST1, "Z2_min": surveys.LEAST2, "Z2_max": surveys.MOST2}
+        out |= {name: float(values[k]) for name, k in names.items()} | {"det_min": float(values[surveys.LEAST_DET])}
+        area = values[surveys.AREA] or np.nan
+        out["shear_mean"] = float(values[surveys.SHEARED] / area)
+        out["rms_surface"] = float(np.sqrt(values[surveys.SQUARES] / area))
+        surveys.determinants(self._row, *self.map.Y, *g.rows(), *g.strides[:2], g.h, self.weight)
         return out | {"rms_box": float(np.sqrt(self._row.mean() / g.n[-1]))}
 
     def survey(self) -> np.ndarray:
-        """Integrals and extremes over the band, columns named in `core.kernels.shear`; kept until Y moves."""
+        """Integrals and extremes over the band, columns named in `core.kernels.shear_survey`; kept until Y moves."""
         band = self._band_now()
         if self._values is None:
             table = np.zeros((band.inside.shape[0], 10))
             where = self._numbers, self._law, self._centre, self._period
-            kernels.survey(table, *self.map.Y, band.inside, self._s, *where)
+            surveys.survey(table, *self.map.Y, band.inside, self._s, *where)
             values = table.max(axis=0, initial=-np.inf)
-            least = [kernels.LEAST_DET, kernels.LEAST1, kernels.LEAST2]
+            least = [surveys.LEAST_DET, surveys.LEAST1, surveys.LEAST2]
             values[least] = table[:, least].min(axis=0, initial=np.inf)
-            values[: kernels.SUMS] = table[:, : kernels.SUMS].sum(axis=0) * self.grid.cell_volume
+            values[: surveys.SUMS] = table[:, : surveys.SUMS].sum(axis=0) * self.grid.cell_volume
             self._values = values
         return self._values
 
@@ -180,7 +199,7 @@ class ShearMembrane(Body):
         """M of the stabiliser: raised as soon as it is looked at, every `REFRESH` steps, but lowered slowly."""
         top, since = self._held
         if since == 0:
-            top = max(float(self.survey()[kernels.STIFF]), LOWER * top)
+            top = max(float(self.survey()[surveys.STIFF]), LOWER * top)
         self._held[:] = top, (since + 1) % REFRESH
         return float(top)
 
@@ -188,7 +207,7 @@ class ShearMembrane(Body):
         """Y(x, 0) by (3.67), over the inflation; with a ``radius`` all layers alike."""
         x, y, z = self.grid.points()
         x, y, z = (q - c for q, c in zip((x, y, z), self._centre, strict=True))
-        height = radius * z / np.sqrt(np.maximum(x**2 + y**2 + z**2, kernels.TINY)) if radius else z
+        height = radius * z / np.sqrt(np.maximum(x**2 + y**2 + z**2, points.TINY)) if radius else z
         cos, sin = np.cos(twist * height), np.sin(twist * height)
         for q, c, values in zip(self.map.Y, self._centre, (x * cos + y * sin, y * cos - x * sin, z), strict=True):
             self.grid.padded(q)[...] = c + values / self.inflation
@@ -204,7 +223,7 @@ class ShearMembrane(Body):
 
     def _band_now(self) -> Band:
         if not self._fresh:
-            kernels.distances(self.phi, *self.map.Y, self._centre, self._period, self._rest)
+            surveys.distances(self.phi, *self.map.Y, self._centre, self._period, self._rest)
             self._band.find(self.phi)
             self._fresh, self._values = True, None
         return self._band

@@ -305,7 +305,8 @@ class ShearMembrane(Spec):
     """A sphere that reacts to its change of area and to shear (3.3), carried by the backward map.
 
     ``law``: quadratic (3.65), linear (E₂' = λ₂), neo-hookean or skalak, see `fsiwork.bodies.shear`; ``area`` and
-    ``shear`` are λ₁ and λ₂, ``volume`` a modulus that holds det ∇Y. The shape is that at t = 0,
+    ``shear`` are λ₁ and λ₂, ``volume`` a modulus that holds det ∇Y, ``slip`` one that holds the layers of the band
+    together. The shape is that at t = 0,
     ``inflation`` its radius over that at rest, ``twist`` t₀ of (3.67),
     which ``alike`` continues off the sphere so that all layers of the band are strained alike. ``coupling: stabilised``
     allows steps beyond the explicit limit, at a loss of accuracy.
@@ -321,6 +322,7 @@ class ShearMembrane(Spec):
     area: NotNegative = 0.0
     shear: Positive
     volume: NotNegative = 0.0
+    slip: NotNegative = 0.0
     width: Width
     coupling: Literal["explicit", "stabilised"] = "explicit"
     twist: Number = 0.0

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 from fsiwork import simulate
 from fsiwork.core.grid import GHOSTS, Grid
-from fsiwork.core.kernels.shear import LEAST_DET
+from fsiwork.core.kernels.shear_survey import LEAST_DET
 
 ROWS = 180  # how often gauges are kept over the run, and 0
 HISTORY = ("axis_x", "axis_z", "det_min", "elastic_energy", "kinetic_energy", "rms_box", "rms_surface", "shear_mean",
@@ -59,7 +59,7 @@ def _carry(sim, points: np.ndarray) -> np.ndarray:
 def _profiles(sim, k: int) -> dict[str, np.ndarray]:
     """Pressure and φ at `STATIONS` along x and z from the middle of the box, named with the number ``k``."""
     grid, p, out = sim.flow.grid, sim.flow.grid.field(), {}
-    grid.inside(p)[...] = sim.flow.pressure()
+    grid.inside(p)[...] = sim.pressure()
     sim.flow.edges.fill_scalar(p, "mirror")
     for name, axis in (("x", 0), ("z", 2)):
         points = np.zeros((STATIONS.size, 3))

@@ -11,7 +11,7 @@ import xarray as xr
 
 from fsiwork.bodies.shear import LIMIT, REFRESH, STABILISER
 from fsiwork.core import energy
-from fsiwork.core.kernels import shear as kernels
+from fsiwork.core.kernels import shear_survey as surveys
 from fsiwork.scene import Scene
 from fsiwork.simulate import Simulation, build, step
 from fsiwork.studies import stability
@@ -37,13 +37,13 @@ class Run:
     def note(self) -> None:
         """Keep t, kinetic energy and all energy of this moment."""
         kinetic = energy.kinetic_energy(self.sim.flow)
-        self.rows.append((self.t, kinetic, kinetic + float(self.sim.bodies[0].survey()[kernels.ENERGY])))
+        self.rows.append((self.t, kinetic, kinetic + float(self.sim.bodies[0].survey()[surveys.ENERGY])))
 
     @property
     def unit(self) -> float:
         """Δx √(ρε/M) now, M the largest modulus of small waves over the band [time]."""
         body, flow = self.sim.bodies[0], self.sim.flow
-        return flow.grid.h * math.sqrt(flow.density * body.eps / float(body.survey()[kernels.STIFF]))
+        return flow.grid.h * math.sqrt(flow.density * body.eps / float(body.survey()[surveys.STIFF]))
 
     def go(self, dt: float) -> bool:
         """One step; whether the energy still is below `RAISED` times the first."""
