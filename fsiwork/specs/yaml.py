@@ -5,8 +5,8 @@ import re
 import yaml
 
 
-class Loader(yaml.SafeLoader):
-    """`yaml.SafeLoader` that reads 1e-3 as a number and neither yes, off nor 12:30:00 as something else."""
+class _Strict:
+    """Reads 1e-3 as a number and neither yes, off nor 12:30:00 as something else."""
 
     def construct_mapping(self, node, deep=False):
         """A mapping; a key that comes twice is an error at its place."""
@@ -22,6 +22,14 @@ class Loader(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
+class Loader(_Strict, yaml.SafeLoader):
+    """For what users write: faults at their places, nothing too deep."""
+
+
+class Quick(_Strict, getattr(yaml, "CSafeLoader", yaml.SafeLoader)):
+    """The same in C, where there is C, for the many files of the book."""
+
+
 _PLAIN = {
     "tag:yaml.org,2002:bool": (r"true|True|TRUE|false|False|FALSE", "tTfF"),
     "tag:yaml.org,2002:int": (r"[-+]?[0-9]+", "-+0123456789"),
@@ -32,7 +40,8 @@ _PLAIN = {
     "tag:yaml.org,2002:null": (r"~|null|Null|NULL|", ["~", "n", "N", ""]),
     "tag:yaml.org,2002:merge": (r"<<", ["<"]),
 }
-Loader.yaml_implicit_resolvers = {}
-for _tag, (_pattern, _first) in _PLAIN.items():
-    Loader.add_implicit_resolver(_tag, re.compile(f"^(?:{_pattern})$"), list(_first))
-Loader.add_constructor("tag:yaml.org,2002:int", lambda loader, node: int(loader.construct_scalar(node)))
+for _loader in (Loader, Quick):
+    _loader.yaml_implicit_resolvers = {}
+    for _tag, (_pattern, _first) in _PLAIN.items():
+        _loader.add_implicit_resolver(_tag, re.compile(f"^(?:{_pattern})$"), list(_first))
+    _loader.add_constructor("tag:yaml.org,2002:int", lambda loader, node: int(loader.construct_scalar(node)))

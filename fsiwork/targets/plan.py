@@ -133,7 +133,7 @@ class Plan:
     def code_of(self, w: Any, study: str | None = None) -> str:
         """Hash of the sources a job depends on."""
         found = self.study(study or w.study, w.size)
-        solver = source_hash() if found.scene else source_hash("core", "bodies")
+        solver = _solver(bool(found.scene))
         return f"{solver}-{sources(found.call, 'studies')}" if found.call else solver
 
     def jobs_of(self, w: Any) -> list[str]:
@@ -173,6 +173,12 @@ class Plan:
     def chapter_of(self, w: Any) -> str:
         """Category of an entry in the report."""
         return f"Chapter {self.entry(w.id, w.size).chapter}"
+
+
+@cache
+def _solver(scene: bool) -> str:
+    """Hash of the sources of a run, or of what a call without a scene may use of them."""
+    return source_hash() if scene else source_hash("core", "bodies")
 
 
 @cache

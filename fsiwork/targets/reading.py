@@ -6,7 +6,7 @@ from typing import Any
 
 import yaml
 
-from fsiwork.specs.yaml import Loader
+from fsiwork.specs.yaml import Quick
 
 SIZES = ("coarse", "book")
 FUNCTION = re.compile(r"([A-Za-z_][\w.]*:)?[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
@@ -24,7 +24,7 @@ class Faults(ValueError):
 def read_yaml(path: Path) -> dict[str, Any]:
     """The mapping in a YAML file; `Faults` with the file's name when it is missing, broken or no mapping."""
     try:
-        data = yaml.load(path.read_text(encoding="utf-8"), Loader)
+        data = yaml.load(path.read_text(encoding="utf-8"), Quick)
     except OSError as error:
         raise Faults(f"{path}: {error.strerror}") from None
     except yaml.MarkedYAMLError as error:
