@@ -46,13 +46,14 @@ def _field(spec, grid: Grid) -> motion.Field:
 
 def _membrane(spec, grid: Grid, edges: Edges) -> Membrane:
     law = _law(spec.energy)
+    centring = 4 if isinstance(law, laws.Linear) and spec.form != "adjoint" else 2
     return Membrane(
         grid,
         edges,
         shape(spec.shape).distance,
         law,
         spec.width.of(grid.h),
-        transport=_transport(spec.transport, grid, edges, 4 if isinstance(law, laws.Linear) else 2),
+        transport=_transport(spec.transport, grid, edges, centring),
         stretch=spec.stretch,
         form=spec.form,
         dirac=spec.dirac,

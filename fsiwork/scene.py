@@ -4,6 +4,7 @@
 its path (``fluid.density: must be positive, got -1``).
 """
 
+import copy
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -346,7 +347,7 @@ def _replace(data: dict, path: str, value: Any) -> str:
         elif not isinstance(place, dict):
             return f"{here}: unknown path, {'.'.join(path.split('.')[:depth])} is {got(place)}"
         if depth == len(parents):
-            place[key] = value
+            place[key] = copy.deepcopy(value)  # a later path may lead into it
         else:
             place = place[key] if isinstance(place, list) else place.setdefault(key, {})
     return ""

@@ -394,3 +394,10 @@ def test_random_right_scenes_come_back_from_json_and_yaml(data):
     assert loads(scene.model_dump_json()) == scene
     assert loads(yaml.safe_dump(json.loads(scene.model_dump_json()))) == scene
     assert hash(loads(scene.model_dump_json())) == hash(scene)
+
+
+def test_values_that_replace_others_stay_as_they_are():
+    """A path may lead into the value of another: a study's settings serve many scenes."""
+    changes = {"clock": {"end": 1.0, "step": 0.1, "frames": 2}, "clock.end": 0.5}
+    assert loads(yaml.safe_dump(GOOD), changes).clock.end == 0.5
+    assert changes["clock"]["end"] == 1.0

@@ -116,6 +116,7 @@ RUNS = {
     "stabilised map": ("elliptic_membrane", {"bodies.0.coupling": "stabilised", "bodies.0.transport.carry": "map"}),
     "variable density": ("rising_drop", WIDE),
     "walls, map": ("sheared_drop", {"output.gauges_every": 4}),
+    "adjoint": ("elliptic_membrane", {"bodies.0.form": "adjoint", "bodies.0.transport.scheme": "upwind5"}),
     "restarted map": ("sheared_drop", {"bodies.0.transport.restart": 1.02, "bodies.0.renew": 2}),
     "lines drawn anew": (
         "sheared_drop",

@@ -92,9 +92,9 @@ class AtPoints:
         """Have E' (``every``: E and E'' too) ready at the centres of the runs."""
         self._ask(kernels.stretch_at_centres, phi, runs, cells, strides, every)
 
-    def nodes(self, phi, runs, cells, strides) -> None:
-        """Have E' ready at the nodes of the runs."""
-        self._ask(kernels.stretch_at_nodes, phi, runs, cells, strides, False)
+    def nodes(self, phi, runs, cells, strides, every=False) -> None:
+        """Have E' (``every``: E and E'' too) ready at the nodes of the runs."""
+        self._ask(kernels.stretch_at_nodes, phi, runs, cells, strides, every)
 
     def _ask(self, stretch, phi, runs, cells, strides, every):
         if self.kind != CALLED:

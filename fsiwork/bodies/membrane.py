@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from fsiwork.bodies.adjoint import Adjoint
 from fsiwork.bodies.backward import BackwardMap, Rest
 from fsiwork.bodies.band import Band
 from fsiwork.bodies.bending import Bending
@@ -40,8 +41,8 @@ class Membrane(Body):
     eps : half-width ε of D_ε [length]
     transport : what carries φ or Y
     stretch : |∇φ₀|, first ratio of current to rest area; counts for a distance only
-    form, dirac : see `bodies.pull`; ``auto``: normal-tangential and plain for surface tension, else divergence and
-        renormalised
+    form, dirac : see `bodies.pull`, or ``adjoint``, see `bodies.adjoint`, which needs ``upwind5`` and centring 2;
+        ``auto``: normal-tangential and plain for surface tension, else divergence and renormalised
     coupling : ``explicit`` (3.59), ``semi-implicit`` (3.62)-(3.64), ``stabilised``, ``iterated``
     carry : ``field`` (φ) or ``map`` (the backward map Y, and φ = stretch · distance(Y)); a map needs a distance
     restart : of a map, see `backward.Rest`; Y is then that of the time since it started anew
@@ -84,13 +85,19 @@ class Membrane(Body):
         renew: int = 0,
     ):
         self._check(phi0, dirac, coupling, carry, renew and restart == np.inf)
+        matched = (transport.scheme, transport.centring, transport.dtype, carry) == ("upwind5", 2, np.float64, "field")
+        if form == "adjoint" and not matched:
+            raise ValueError("the form adjoint needs a float64 field carried by upwind5 with centring 2")
         self.grid, self.edges, self.transport, self.eps = grid, edges, transport, float(eps)
         self.coupling, self.inside, self.surface_mass = coupling, inside, float(surface_mass)
         self._law = AtPoints(law, grid)
         drop = self._law.kind == LINEAR
         form = ("normal-tangential" if drop else "divergence") if form == "auto" else form
-        dirac = ("plain" if form == "normal-tangential" else "renormalised") if dirac == "auto" else dirac
-        self._pull = Pull(grid, self._law, form, self.eps, dirac == "renormalised")
+        plain = form == "normal-tangential" or (form == "adjoint" and drop)
+        dirac = ("plain" if plain else "renormalised") if dirac == "auto" else dirac
+        smeared = self.eps, dirac == "renormalised"
+        self._adjoint = Adjoint(grid, edges, self._law, *smeared) if form == "adjoint" else None
+        self._pull = self._adjoint or Pull(grid, self._law, form, *smeared)
         self._bending = Bending(grid, bending, self.eps, dirac == "renormalised") if bending else None
         self.form, self.dirac, self.passes = form, dirac, 2 if coupling == "iterated" else 1
         self._distance, self._stretch = phi0, float(stretch)
@@ -131,7 +138,7 @@ class Membrane(Body):
             phi = self.predict(flow, dt) if self.guess is None else self.guess["phi"]
             band = self._other = self._other or Band(self.grid, self.eps, self.dirac == "renormalised")
             band.find(phi)
-        self._pull.add(flow.force, phi, band)
+        self._pull.add(flow.force, phi, band, *([flow.u] if self._adjoint else []))
         if self._bending:
             self._bending.add(flow.force, phi, band)
 
@@ -141,7 +148,8 @@ class Membrane(Body):
             self.map.move(flow.u, dt)
             self._rest.level(self.phi)
         else:
-            self.transport.advance([self.phi], flow.u, dt, "linear")
+            u = self._adjoint.filtered(flow.u) if self._adjoint else flow.u
+            self.transport.advance([self.phi], u, dt, "linear")
             self._layers.moved(self.phi)
         self._fresh = False
         if self.map and self._rest.restart < np.inf and self._rest.wound(self._band_now().inside):
@@ -172,6 +180,10 @@ class Membrane(Body):
         often = IN_TIME if drop_or_stabilised else PREDICTED_IN_TIME
         return {"elastic, accuracy": often * min(limits.values())} | bent
 
+    def potential(self) -> np.ndarray | None:
+        """Of the adjoint form, see there."""
+        return self._adjoint.potential(self.phi, self._band_now()) if self._adjoint else None
+
     def state(self) -> dict[str, np.ndarray]:
         """φ, and Y if it is carried, with its rest; how often φ has moved if that counts."""
         rest = self._rest.state() if self.map else {}
@@ -197,7 +209,8 @@ class Membrane(Body):
         values, measure = self.survey(), "length" if self.grid.dim == 2 else "area"
         volume, centre = self._inside.volume(self.phi, self._band_now())
         out = {"volume": volume, measure: float(values[kernels.LENGTH])}
-        out |= {"elastic_energy": float(values[kernels.ENERGY])}
+        stored = self._adjoint.energy(self.phi, self._band_now()) if self._adjoint else values[kernels.ENERGY]
+        out |= {"elastic_energy": float(stored)}
         if self._bending:
             out["bending_energy"] = self._bending.energy(self.phi, self._band_now())
             out["elastic_energy"] += out["bending_energy"]

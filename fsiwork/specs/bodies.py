@@ -137,7 +137,7 @@ class Membrane(Spec):
     energy: Energy
     width: Width
     coupling: Literal["explicit", "semi-implicit", "stabilised", "iterated"] = "semi-implicit"
-    form: Literal["auto", "normal-tangential", "divergence", "split", "korteweg"] = "auto"
+    form: Literal["auto", "normal-tangential", "divergence", "split", "korteweg", "adjoint"] = "auto"
     dirac: Literal["auto", "plain", "renormalised"] = "auto"
     inside: Inside | None = None
     surface_mass: NotNegative = 0.0
@@ -151,6 +151,9 @@ class Membrane(Spec):
             yield ("transport", "band"), "is for kind: interface; a membrane's |∇φ| is its stretch"
         if self.transport.from_interface:
             yield ("transport", "from_interface"), "is for bodies of kind interface"
+        own = self.transport
+        if self.form == "adjoint" and (own.scheme, own.carry, own.dtype) != ("upwind5", "field", "float64"):
+            yield ("form",), "adjoint needs transport.scheme: upwind5, whose derivative is linear, of a float64 field"
         if self.renew and self.transport.carry == "map" and not self.transport.restart:
             yield ("renew",), "is for transport.carry: field; a map makes φ anew each step, unless it has a restart"
         if self.bending and self.coupling == "iterated":
