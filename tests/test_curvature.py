@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from fsiwork.core import curvature as curvature_of
 from fsiwork.core import levelset
 from fsiwork.core.curvature import curvatures, of_ellipsoid, of_torus, shifted
 from fsiwork.core.grid import Grid
@@ -135,3 +136,16 @@ def test_section_7_1_on_small_grids():
     header, rows = curvature.rows_7_1({"curvature": study}, measured)
     assert [row[0] for row in rows] == cells
     assert {len(row) for row in rows} == {len(header)}
+
+
+def test_willmore_energy_and_area_of_a_ball_a_torus_and_a_part():
+    """8π; 2π²c²/√(c² - 1), c = R/r; and an eighth of the ball, whatever the scale of φ."""
+    grid, c = Grid((48,) * 3, 1 / 24, (-1.0,) * 3), 0.55 / 0.3
+    ball = curvature_of.willmore(grid, grid.sample(lambda x, y, z: 7 * ((x - 0.01) ** 2 + y * y + z * z - 0.36)))
+    torus = curvature_of.willmore(grid, grid.sample(Torus((0.0, 0.013, 0.0), 0.55, 0.3).distance))
+    assert ball == pytest.approx((8 * math.pi, 4 * math.pi * 0.36), rel=1e-4)
+    exact = 2 * math.pi**2 * c * c / math.sqrt(c * c - 1), 4 * math.pi**2 * 0.55 * 0.3
+    assert torus == pytest.approx(exact, rel=3e-4)
+    part = Grid((24,) * 3, 1 / 24)
+    found = curvature_of.willmore(part, part.sample(Ball((0.0, 0.0, 0.0), 0.6).distance))
+    assert found == pytest.approx((math.pi, 0.5 * math.pi * 0.36), rel=1e-3)

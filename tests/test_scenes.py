@@ -15,13 +15,14 @@ from fsiwork.core.flow import Flow
 from fsiwork.core.grid import Grid
 from fsiwork.core.shapes import Ellipsoid
 from fsiwork.core.transport import Transport
-from fsiwork.scene import load
+from fsiwork.scene import SceneError, load
 from fsiwork.simulate import build, frames, step
 
 SCENES = sorted((Path(__file__).resolve().parents[1] / "configs" / "scenes").glob("*.yaml"))
 NAMES = [path.stem for path in SCENES]
 COUPLINGS = ("explicit", "semi-implicit", "stabilised", "iterated")
 ITERATIVE = {"rising_drop"}  # scenes whose pressure is solved to a tolerance
+MIRRORED = {"vesicle_rest", "vesicle_shear"}  # with planes of symmetry, where no map goes
 
 
 def small(name, steps=10, **changes):
@@ -73,6 +74,10 @@ def divergence(flow):
 @pytest.mark.parametrize("carry", ["field", "map"])
 @pytest.mark.parametrize("name", NAMES)
 def test_every_scene_runs_and_keeps_what_a_flow_keeps(name, carry):
+    if carry == "map" and name in MIRRORED:
+        with pytest.raises(SceneError, match="only bodies that carry a field are mirrored"):
+            small(name, **carried(name, carry))
+        return
     made = small(name, **carried(name, carry))
     if carry == "map" and not made.bodies:
         assert name in ("cavity", "taylor_green")  # nothing to carry
@@ -95,7 +100,10 @@ def test_every_scene_runs_and_keeps_what_a_flow_keeps(name, carry):
         assert all(there == (carry == "map") for there in maps)
 
 
-@pytest.mark.parametrize("name", [n for n in NAMES if any(body.kind == "membrane" for body in small(n).bodies)])
+MEMBRANES = [n for n in NAMES if n not in MIRRORED and any(body.kind == "membrane" for body in small(n).bodies)]
+
+
+@pytest.mark.parametrize("name", MEMBRANES)
 def test_field_and_map_carry_the_interface_alike(name):
     """The same volume and the same half-axes to a tenth of a cell; both know where the material was."""
     (one, field), (other, back) = (

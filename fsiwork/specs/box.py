@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, WrapValidator
 
-from fsiwork.specs.base import Positive, Spec, Vector, finite, one_of, sense, whole
+from fsiwork.specs.base import Positive, Spec, Unsound, Vector, finite, one_of, sense, whole
 from fsiwork.specs.faults import Fault, got, wrong
 
 AXES = "xyz"
@@ -147,9 +147,12 @@ class Box(Spec):
 
     @property
     def sides(self) -> tuple[tuple[SideSpec, SideSpec], ...]:
-        """(low, high) side of each direction."""
+        """(low, high) side of each direction; not there if one is missing."""
         if isinstance(self.edges, Edges):
-            return tuple(getattr(self.edges, AXES[a]) for a in range(self.dim))
+            pairs = tuple(getattr(self.edges, AXES[a]) for a in range(self.dim))
+            if None in pairs:
+                raise Unsound("sides")
+            return pairs
         return ((EVERYWHERE[self.edges],) * 2,) * self.dim
 
     @sense
