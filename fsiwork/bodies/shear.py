@@ -98,12 +98,12 @@ class ShearMembrane(Body):
         g, (x, y, _) = self.grid, self.grid.strides
         gradient, band = self.gradient(), self._band_now()
         for a, s in enumerate(g.strides):
-            kernels.smooth(self._u[a], flow.u[a], *g.rows(0, 1), x, y, 0.0)
+            kernels.smooth(self._face, flow.u[a], *g.rows(0, 1), x, y, 0.0)
             self._q.fill(0.0)
-            kernels.pulls(self._q, *gradient, *self.map.Y, self._u[a], band.runs, s, g.h)
+            kernels.pulls(self._q, *gradient, *self.map.Y, self._face, band.runs, s, g.h)
             self.edges.fill_scalar(self._q, "mirror")
-            kernels.to_faces(self._u[a], self._q, *g.rows(1, 1), s)
-            kernels.smooth(flow.force[a], self._u[a], *g.rows(), x, y, 1.0)
+            kernels.to_faces(self._face, self._q, *g.rows(1, 1), s)
+            kernels.smooth(flow.force[a], self._face, *g.rows(), x, y, 1.0)
 
     def move(self, flow, dt: float) -> None:
         """Carry Y with the filtered new velocity."""
@@ -215,7 +215,8 @@ class ShearMembrane(Body):
     def _plan(self):
         g = self.grid
         self._P = np.zeros((12, g.size))  # pages that the band never touches cost nothing
-        self._g, self._u = [g.field() for _ in g.axes], [g.field() for _ in g.axes]
+        self._g = self._u = [g.field() for _ in g.axes]  # the gradient has served when Y moves
+        self._face = g.field()
         self._q, self.phi = g.field(), g.field()
         self._band, self._inside = Band(g, self.eps, False), Inside(g, self.edges, self.eps)
         self._s, self._row = np.array(g.strides), np.zeros(g.rows()[0].size)
