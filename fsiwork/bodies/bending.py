@@ -13,9 +13,9 @@ class Bending:
     """Adds F = k[Δ_ΓH + ½H(H² - 4G)] D_ε∇φ [force/volume] to flat face fields; in the plane G = 0.
 
     The gradient of the discrete energy with the transport's derivative and one filter, as `bodies.adjoint` has it, was
-    tried: it makes no energy, at ε = 2 Δx and N = 128 too, where ``pointwise`` makes a third of the first; but an ellipse
-    then bends back too slowly, and ever more so on finer grids with ε/Δx kept (half-axis at t = 0.5, bent_membrane with
-    μ = 0.01, ε = 3 Δx: 0.476 and 0.489 for N = 64 and 128, against 0.461 and 0.464). It was left out.
+    tried: it makes no energy, at ε = 2 Δx and N = 128 too, where ``pointwise`` makes a third of the first; but an
+    ellipse then bends back too slowly, and more so on finer grids with ε/Δx kept (half-axis at t = 0.5, bent_membrane
+    with μ = 0.01, ε = 3 Δx: 0.476 and 0.489 for N = 64 and 128, against 0.461 and 0.464). It was left out.
 
     Parameters
     ----------
