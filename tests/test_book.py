@@ -13,7 +13,7 @@ from fsiwork.targets.studies import short_names, text
 ROOT = Path(__file__).resolve().parents[1]
 PLAN = Plan(ROOT / "configs")
 ASKED = {
-    *(f"fig_3_{n}" for n in range(9, 17)), "table_3_1", "stability_1_54", "taylor_green", "cavity",
+    *(f"fig_3_{n}" for n in range(9, 18)), "table_3_1", "stability_1_54", "taylor_green", "cavity",
     "mode_drop", "mode_membrane", "tradeoff_membrane", "energy_law",
 }  # fmt: skip
 

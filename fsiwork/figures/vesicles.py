@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from fsiwork.figures import style
 from fsiwork.studies import vesicle_rest as rest
+from fsiwork.studies import vesicle_shear as shear
 
 COLOUR = {"prolate": style.OKABE_ITO[0], "oblate": style.OKABE_ITO[1]}
 LIGHT = np.array([-0.35, -0.5, 0.8]) / np.linalg.norm([-0.35, -0.5, 0.8])
@@ -120,4 +121,58 @@ def fig_3_16(datasets: Mapping[str, xr.Dataset], measured: Mapping[str, float]) 
         _energies(ax, data, shapes, volume)
     words = f"energies within {measured['energy']:.2g} %, meridians within {measured['profile']:.2g} % of R"
     style.note(figure, datasets, f"{words} of the shape equation; two starts within {measured['starts']:.2g} %")
+    return figure
+
+
+RUNS = {"v90": "0.9", "v90_high": "0.9, higher box", "v90_fine": "0.9, finer grid", "v95": "0.95"}
+LOOK = dict(zip(RUNS, ("-", "--", ":", "-"), strict=True))
+MAIN = ("v90", "v95")
+
+
+def _shapes_in_shear(axes, data: xr.Dataset, measured: Mapping[str, float]) -> None:
+    """Outlines in the plane of shear, dark to light over time, the long axis at the end, and the flow."""
+    for ax, case in zip(axes, MAIN, strict=True):
+        one = data.sel(case=case)
+        for k, colour in enumerate(style.shades(shear.SHOTS)):
+            t = float(one["t"][k * (shear.ROWS // (shear.SHOTS - 1))])
+            line = one[f"line_{k}"].values.reshape(-1, 2)
+            ax.plot(*np.vstack([line, line[:1]]).T, color=colour, label=f"γ̇t = {t * float(one['rate']):.1f}")
+        turn, half = np.radians(measured[f"angle_{case}"]), 1.05 * float(one["axis_1"][-1])
+        ax.plot(*np.outer([np.cos(turn), np.sin(turn)], [-half, half]), color="0.4", linewidth=0.8)
+        for y in np.linspace(-1.2, 1.2, 7):
+            if abs(y) > 0.1:
+                ax.annotate("", (-1.95 + 0.3 * y, y), (-1.95, y), arrowprops={"arrowstyle": "->", "color": "0.6"})
+        ax.axhline(0.0, color="0.8", linewidth=0.6)
+        ax.set(xlabel="x/R [1]", ylabel="y/R [1]", aspect="equal", xlim=(-2.4, 2.0), ylim=(-1.35, 1.35))
+        ax.set_title(f"reduced volume {RUNS[case]}: {measured[f'angle_{case}']:.1f}°")
+        ax.legend(fontsize=7, loc="lower right")
+
+
+def fig_3_17(datasets: Mapping[str, xr.Dataset], measured: Mapping[str, float]) -> Figure:
+    """Above: outlines in the plane of shear at some times; below: angle, area and volume over time."""
+    data = datasets["vesicle_shear"]
+    figure = Figure(figsize=(9.8, 6.6))
+    above, below = figure.subfigures(2, 1, height_ratios=(1.1, 1))
+    _shapes_in_shear(above.subplots(1, 2), data, measured)
+    angle, kept = below.subplots(1, 2)
+    for case, name in RUNS.items():
+        one, colour = data.sel(case=case), style.OKABE_ITO[case == "v95"]
+        strain = one["t"] * one["rate"]
+        angle.plot(strain, one["angle"], LOOK[case], color=colour, label=name)
+        kept.plot(strain, 100 * (one["area"] / one["area"][0] - 1), LOOK[case], color=colour, label=f"area, {name}")
+        if case in MAIN:
+            angle.axhline(measured[f"theory_{case}"], color=colour, linewidth=0.9, linestyle=(0, (6, 2)), alpha=0.7)
+            change = 100 * (one["volume"] / one["volume"][0] - 1)
+            kept.plot(strain, change, color=("0.2", "0.55")[case == "v95"], linewidth=1.0, label=f"volume, {name}")
+    angle.axvspan(float(data["t"].max()) - shear.LAST, float(data["t"].max()), color="0.35", alpha=0.08, linewidth=0)
+    angle.set(xlabel="strain γ̇t [1]", ylabel="angle of the long axis to the flow [°]", ylim=(20, 36))
+    angle.set_title("angle; dashed, thin: small deformations, unbounded")
+    angle.legend(title="reduced volume", title_fontsize=7, fontsize=7, ncols=2, loc="upper right")
+    for level in (-1, 1):
+        kept.axhline(level, **style.REFERENCE)
+    kept.set(xlabel="strain γ̇t [1]", ylabel="change from the start [%]", ylim=(-1.15, 1.9), title="what is kept")
+    kept.legend(fontsize=7, ncols=2, loc="upper right")
+    words = f"drift over the last {shear.LAST:g} strain units (shaded) ≤ {measured['drift']:.2g}°, "
+    words += f"area within {measured['area']:.2g} %, volume within {measured['volume']:.2g} %"
+    style.note(figure, datasets, words)
     return figure

@@ -54,7 +54,7 @@ def tilt(second: np.ndarray) -> float:
     return math.degrees(0.5 * math.atan2(2 * second[0, 1], second[0, 0] - second[1, 1]))
 
 
-def _even(points: np.ndarray) -> np.ndarray:
+def even(points: np.ndarray) -> np.ndarray:
     """The line through ``points`` by `AROUND` points, evenly along it, shape (AROUND, 2)."""
     closed = np.concatenate([points, points[:1]])
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
@@ -88,7 +88,7 @@ def follow(scene, point: dict[str, Any]) -> dict[str, Any]:
             found = {"t": frame.t, "angle": tilt(second)} | {name: gauge[key] for name, key in NAMES.items()}
             for name, value in found.items():
                 table[name][row] = value
-            lines.append(_even(line) / radius)
+            lines.append(even(line) / radius)
             pressures.append(_around(frame.fields["p"][1], grid, radius))
     table["angle"][: len(lines)] = np.unwrap(table["angle"][: len(lines)], period=HALF_TURN)
     out: dict[str, Any] = {name: (("row",), values) for name, values in table.items()}
