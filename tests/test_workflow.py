@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fsiwork.studies import scorecard, sweep
+from fsiwork.studies import jobs, scorecard, sweep
 from fsiwork.targets import Check, Plan
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -261,3 +261,11 @@ def test_every_alias_is_a_rule():
     done = subprocess.run([sys.executable, "-m", "snakemake", "--list-rules"], capture_output=True, text=True, cwd=ROOT)
     rules = set(done.stdout.split())
     assert {"all", "book", "chapter_1", "chapter_3", *Plan(ROOT / "configs").book("coarse")} <= rules
+
+
+@pytest.mark.parametrize("size", ["coarse", "book"])
+def test_every_scene_of_a_study_has_a_small_grid_to_compile_on(size):
+    """Boxes of all shapes: 32 cells along the longest side do not divide each of them."""
+    plan = Plan(ROOT / "configs")
+    scenes = [(plan.scene(one), point.overrides) for one in plan.studies(size) if one.scene for point in one.points]
+    assert max(jobs._small(Path(path), overrides).box.cells for path, overrides in scenes) <= jobs.WARM_CELLS[-1]

@@ -16,7 +16,7 @@ from fsiwork.checkpoint import replacing
 from fsiwork.netcdf import opened
 from fsiwork.targets import Plan, Point, Study
 
-WARM_CELLS = 32  # grid on which `warm` compiles
+WARM_CELLS = (32, 36, 40, 48, 60)  # grids on which `warm` compiles: the first into which a box can be divided
 
 
 def compute(plan: Plan, study: Study, job: str, size: str) -> list[Path]:
@@ -79,18 +79,30 @@ def _write_json(path: Path, data: Any) -> None:
 
 def warm(scenes: Iterable[tuple[Path, dict[str, Any]]]) -> int:
     """Compile what the scenes need: two steps of each on a small grid. Returns how many different ones there were."""
-    from fsiwork import scene
     from fsiwork.simulate import frames
 
     done = set()
     for path, overrides in scenes:
-        small = scene.load(path, {**overrides, "box.cells": WARM_CELLS, "clock.step": 1e-4, "clock.end": 2e-4})
+        small = _small(path, overrides)
         key = sources.scene_id(small.model_dump_json())
         if key not in done:
             done.add(key)
             for _ in frames(small):
                 pass
     return len(done)
+
+
+def _small(path: Path, overrides: dict[str, Any]):
+    """A scene for two steps on the first of `WARM_CELLS` that suits it, else on its own grid."""
+    from fsiwork import scene
+
+    short = {**overrides, "clock.step": 1e-4, "clock.end": 2e-4}
+    for cells in WARM_CELLS:
+        try:
+            return scene.load(path, {**short, "box.cells": cells})
+        except scene.SceneError:
+            continue
+    return scene.load(path, short)
 
 
 # ---------------------------------------------------------------------------------------------------- joining
