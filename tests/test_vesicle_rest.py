@@ -13,7 +13,8 @@ from fsiwork.core.grid import Grid
 from fsiwork.core.integrals import area_and_volume
 from fsiwork.core.shapes import Ellipsoid
 from fsiwork.figures import vesicles as figures
-from fsiwork.scene import load
+from fsiwork.scene import SceneError, load
+from fsiwork.studies import jobs
 from fsiwork.studies import vesicle_rest as study
 from fsiwork.studies.vesicles import equilibrium
 
@@ -167,3 +168,10 @@ def test_an_eighth_counts_eight_times():
     grid, phi = eighth(32)
     area, volume = area_and_volume(grid, phi)
     assert (8 * area, 8 * volume) == pytest.approx(_spheroid(0.5, 0.8), rel=1e-4)
+
+
+def test_kernels_are_compiled_beforehand_for_a_box_that_32_cells_do_not_fill():
+    slender = {"box.length": [1.0, 1.0, 3.0], "box.cells": 36, "bodies.0.shape.semi_axes": [0.5, 0.5, 2.0]}
+    with pytest.raises(SceneError):
+        load(SCENE, slender | {"box.cells": jobs.WARM_CELLS})
+    assert jobs.warm([(SCENE, slender)]) == 1
