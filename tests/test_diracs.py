@@ -63,9 +63,10 @@ def test_two_planes_within_one_cell():
 
 
 @pytest.mark.parametrize("centre", [CENTRE, (0.4375,) * 3])
-@pytest.mark.parametrize(("cells", "tolerance"), [(0.2, 5e-3), (0.5, 1e-5), (1.2, 1e-5)])
+@pytest.mark.parametrize(("cells", "tolerance"), [(0.2, 5e-3), (0.5, 2e-5), (1.2, 2e-5)])
 def test_a_body_smaller_than_two_cells(cells, tolerance, centre):
-    """A polynomial φ, so that the interpolant is exact: what is left is the quadrature."""
+    """A polynomial φ, so that the interpolant is exact: what is left is the quadrature. With the centre on a node the
+    signs of zeros, and so the processor, decide how cells are cut: 1.0e-5 on one, 1.2e-5 on another."""
     radius = cells * EIGHT.h
     assert area_and_volume(EIGHT, ball(radius, centre)) == pytest.approx(of_ball(radius), rel=tolerance)
 
