@@ -4,9 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from fsiwork.scene import load
 from fsiwork.studies import shear
+from fsiwork.studies import shear_measures as measures
 
 SCENE = Path(__file__).resolve().parents[1] / "configs" / "scenes" / "sheared_sphere.yaml"
 
@@ -14,25 +16,36 @@ SCENE = Path(__file__).resolve().parents[1] / "configs" / "scenes" / "sheared_sp
 @pytest.mark.parametrize("p", [1.0, 2.0, 3.5])
 def test_order_of_curves_on_three_grids(p):
     steps, curve = [1 / 32, 1 / 48, 1 / 64], np.linspace(0.5, 1.0, 7)
-    assert shear.order(steps, [0.5 + h**p * curve for h in steps]) == pytest.approx(p, rel=1e-9)
-    assert np.isnan(shear.order(steps, [curve, 2 * curve, 5 * curve]))
+    assert measures.order(steps, [0.5 + h**p * curve for h in steps]) == pytest.approx(p, rel=1e-9)
+    assert np.isnan(measures.order(steps, [curve, 2 * curve, 5 * curve]))
 
 
-def test_a_smeared_jump_is_as_wide_as_itself():
-    phi = 1.2 * (shear.STATIONS - 0.47)
-    eps = 0.11
+def test_a_smeared_jump_is_as_wide_as_itself_whatever_the_slopes_beside_it():
+    """A jump with a kink and a slope, smeared by H_ε: width 1 and no overshoot; a wider jump, and a bump on it."""
+    phi, eps = 1.2 * (shear.STATIONS - 0.47), 0.11
     q = np.clip(phi / eps, -1, 1)
-    jump = 3.0 - 2.0 * 0.5 * (1 + q + np.sin(np.pi * q) / np.pi)
-    width, overshoot = shear.smeared(jump, phi, eps)
-    assert width == pytest.approx(1.0, rel=1e-12)
-    assert overshoot == pytest.approx(0.0, abs=1e-12)
-    twice = np.clip(phi / (1.4 * eps), -1, 1)
-    wide, over = shear.smeared(
-        -twice - np.sin(np.pi * twice) / np.pi + 0.3 * np.exp(-((phi / eps + 1.2) ** 2) * 50), phi, eps
+    H = 0.5 * (1 + q + np.sin(np.pi * q) / np.pi)
+    kink = np.concatenate([[0.0], np.cumsum(0.5 * (H[1:] + H[:-1]) * np.diff(shear.STATIONS))])
+    jump, width, overshoot = measures.smeared(0.3 - 0.8 * H + 1.7 * kink - 0.9 * phi, phi, eps)
+    assert (jump, width) == (pytest.approx(0.8, rel=1e-9), pytest.approx(1.0, rel=1e-9))
+    assert overshoot < 1e-9
+    middle = np.clip(phi / (0.7 * eps), -1, 1)
+    _, narrow, over = measures.smeared(
+        -middle - np.sin(np.pi * middle) / np.pi + 0.3 * np.exp(-((phi / eps + 0.75) ** 2) * 150), phi, eps
     )
-    assert wide == pytest.approx(1.4, rel=0.01)
+    assert narrow == pytest.approx(0.7, rel=0.02)
     assert over == pytest.approx(0.15, abs=0.01)
-    assert np.isnan(shear.smeared(jump, phi + 5.0, eps)).all()
+    assert np.isnan(measures.smeared(H, phi + 5.0, eps)).all()
+
+
+def test_only_the_last_crossing_of_an_axis_counts():
+    eps = 0.05
+    phi = np.minimum(np.abs(shear.STATIONS - 0.25) - 0.12, np.abs(shear.STATIONS - 0.75) - 0.15)
+    q = np.clip((shear.STATIONS - 0.9) / eps, -1, 1)
+    p = 1 - 0.5 * (1 + q + np.sin(np.pi * q) / np.pi)
+    p[shear.STATIONS < 0.5] = 7.0
+    jump, width, _ = measures.smeared(p, phi, eps)
+    assert (jump, width) == (pytest.approx(1.0, rel=1e-9), pytest.approx(1.0, rel=1e-9))
 
 
 def test_markers_start_where_the_map_has_the_lines_of_the_globe():
@@ -47,17 +60,52 @@ def test_a_short_run_tells_everything():
         "box.cells": 20,
         "bodies.0.width": {"cells": 2},
         "clock.end": 0.1,
-        "clock.step": 0.01,
+        "clock.frames": 4,
         "bodies.0.twist": 1.0,
     }
-    found = shear.relax(load(SCENE, changes), {})
-    assert found["ended"] == "complete"
-    assert found["n_steps"] == 10
-    for name in ("t", *shear.HISTORY, "created"):
-        dims, values = found[name]
-        assert (dims, values.size, bool(np.isfinite(values).all())) == (("row",), shear.ROWS + 1, True), name
-    assert found["t"][1][-1] == pytest.approx(0.1)
-    assert -0.05 < found["created"][1][-1] < 0.01
-    assert np.isfinite(found["p_x_0"]).all()
-    assert np.abs(np.linalg.norm(found["markers_0"].reshape(-1, 3), axis=1) - 0.5).max() < 1e-12
-    assert 0.0 < found["away"] < 0.05
+    for step in (0.01, "auto"):
+        found = shear.relax(load(SCENE, changes | {"clock.step": step}), {})
+        assert found["ended"] == "complete"
+        assert step == "auto" or found["n_steps"] == 10
+        for name in ("t", *shear.HISTORY, "created", "det_min"):
+            dims, values = found[name]
+            assert (dims, values.size, bool(np.isfinite(values).all())) == (("row",), 5, True), name
+        assert found["t"][1] == pytest.approx([0.0, 0.025, 0.05, 0.075, 0.1], abs=0.006)
+        assert -0.05 < found["created"][1][-1] < 0.01
+        assert np.isfinite(found["p_x_0"]).all()
+        assert "p_x_1" not in found
+        assert np.abs(np.linalg.norm(found["markers_0"].reshape(-1, 3), axis=1) - 0.5).max() < 1e-12
+        assert 0.0 < found["away"] < 0.05
+
+
+def dataset(**changes):
+    """Three refined grids whose radius errs by h², and one with layers that slide."""
+    cases, t = ["n32", "n48", "n64", "free32"], np.linspace(0, 4, 81)
+    cells = np.array([32, 48, 64, 32])
+    radius = 0.5 + 0.1 * np.sin(t) + (2 / cells[:, None]) ** 2 * np.cos(t)
+    q = np.clip((shear.STATIONS - 0.5) / 0.1, -1, 1)
+    p = np.tile(1 - 0.5 * (1 + q + np.sin(np.pi * q) / np.pi), (4, 1))
+    names = ("axis_x", "axis_z", "rms_box", "rms_surface", "volume", "created", "det_min")
+    data = dict.fromkeys(names, (("case", "row"), radius)) | {"t": (("case", "row"), np.tile(t, (4, 1)))}
+    data |= {"rms_box": (("case", "row"), np.outer(1 / cells, t)), "eps": ("case", np.full(4, 0.1))}
+    for axis in "xz":
+        for k in range(2):
+            data[f"p_{axis}_{k}"] = (("case", "station"), p * (1.0 if k == 0 else 0.05))
+            data[f"phi_{axis}_{k}"] = (("case", "station"), np.tile(shear.STATIONS - 0.5, (4, 1)))
+    data["speed"] = (("case", "marker"), np.array([[1.0, 2.0], [1.0, 2.2], [1.0, 2.1], [1.0, 3.0]]))
+    return {"sheared_sphere": xr.Dataset(data | changes, coords={"case": cases})}
+
+
+def test_what_is_measured_of_the_refined_grids():
+    data = dataset()
+    assert measures.grids(data["sheared_sphere"]) == ["n32", "n48", "n64"]
+    orders = measures.fig_3_22(data)
+    assert orders["order_early"] == pytest.approx(2.0, rel=1e-6)
+    assert orders["order_late"] == pytest.approx(2.0, rel=1e-6)
+    assert measures.fig_3_19(data)["gap"] == pytest.approx(1 / 22)
+    assert measures.norms(data)["rms_box_ratio"] == pytest.approx(0.75)
+    found = measures.pressure(data)
+    assert (found["clear"], found["width"]) == (2, pytest.approx(1.0, rel=1e-6))
+    assert found["jump_x_1"] == pytest.approx(0.05, rel=1e-6)
+    created = measures.fig_3_18(data)
+    assert created["created"] == pytest.approx(max(created[f"created_{case}"] for case in ("n32", "n48", "n64")))

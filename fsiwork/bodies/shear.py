@@ -19,6 +19,7 @@ LAWS = {
     "neo-hookean": points.NEO_HOOKEAN,
     "skalak": points.SKALAK,
 }
+SKIN = 1.4  # half-width over ε of the weight that holds layers together
 LIMIT = 2.8  # explicit limit over Δx√(ρε/M) (MEASURED-coupling 6)
 COUPLINGS = ("explicit", "stabilised")
 STABILISER = 0.25  # c, stable to 100 times the explicit step (MEASURED-coupling 6)
@@ -45,7 +46,8 @@ class ShearMembrane(Body):
         against the transport's errors of det ∇Y, by which the discrete energy of a membrane under tension can fall
     slip : κ_s [energy per area at rest] of ½κ_s tan²θ, θ the angle between n and the image of the normal at rest: the
         layers of the band do not slide freely over each other, as they do by SPEC 7, where the middle ones bear all of
-        the force; the band becomes a shell, whose resistance to bending goes with ε²
+        the force; the band becomes a shell, whose resistance to bending goes with ε². Its weight S_ε is D of half-width
+        `SKIN` ε, so that the edges of the band are held too
     eps : half-width ε of the plain D_ε, in lengths at rest
     twist : t₀ of (3.67) [angle/length], about the axis through the centre along z
     inflation : radius at t = 0 over that at rest; J₀ is its cube
@@ -81,9 +83,9 @@ class ShearMembrane(Body):
         self._held = np.zeros(2)  # M of the stabiliser, and the steps since it was looked at
         self._rest = float(radius) / self.inflation
         self._centre = np.array(centre, float)
-        self._numbers = np.array(
-            [grid.h, self.eps, self._rest, self.weight, float(area), float(shear), float(volume), float(slip)]
-        )
+        self._skin = SKIN * self.eps if slip else self.eps
+        moduli = float(area), float(shear), float(volume), float(slip)
+        self._numbers = np.array([grid.h, self.eps, self._rest, self.weight, *moduli, self._skin])
         self._period = np.array([grid.length[a] if edges.periodic(a) else 0.0 for a in grid.axes])
         self.map = BackwardMap(grid, edges, Transport(grid, edges, "upwind5", centring=2))
         if twist or inflation != 1.0:
@@ -124,7 +126,7 @@ class ShearMembrane(Body):
         return self._g
 
     def potential(self) -> np.ndarray:
-        """D_ε(E + n·Tn), filtered as the force is: of the force, which is ∇(D_ε E) + div(D_ε T), the part that is a
+        """D_ε E + S_ε E_s + n·Tn, filtered as the force is: of the force, ∇(D_ε E + S_ε E_s) + div T, what is a
         gradient. Without it the pressure is that of SPEC 7, div(ΣE_i'Z_iC_iD_ε) alone."""
         g, band, (x, y, z) = self.grid, self._band_now(), self.grid.strides
         nodes, q = g.field(), g.field()
@@ -218,7 +220,7 @@ class ShearMembrane(Body):
         self._g = self._u = [g.field() for _ in g.axes]  # the gradient has served when Y moves
         self._face = g.field()
         self._q, self.phi = g.field(), g.field()
-        self._band, self._inside = Band(g, self.eps, False), Inside(g, self.edges, self.eps)
+        self._band, self._inside = Band(g, self._skin, False), Inside(g, self.edges, self.eps)
         self._s, self._row = np.array(g.strides), np.zeros(g.rows()[0].size)
         self._fresh, self._values = False, None
 

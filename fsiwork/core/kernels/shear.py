@@ -2,15 +2,15 @@
 
 A node is the low corner of the cell of its index; ∇Y there are compact differences of the 8 cells around, Ȳ is
 their mean. ``period`` holds the lengths of the box along periodic directions, else 0. ``numbers`` = (h, ε, radius at
-rest, weight of the energy, moduli of area, shear, volume, slip); ``law`` is a code of `kernels.shear_points`. Runs
-as in `kernels.membrane`.
+rest, weight of the energy, moduli of area, shear, volume, slip, half-width of S_ε); ``law`` is a code of
+`kernels.shear_points`. Runs as in `kernels.membrane`.
 """
 
 import numpy as np
 from numba import njit, prange
 
 from fsiwork.core.kernels import FASTMATH, loop, point
-from fsiwork.core.kernels.shear_points import TINY, energy, place, sliding, surface, times, transposed
+from fsiwork.core.kernels.shear_points import TINY, dirac, energy, place, sliding, surface, times, transposed
 
 # Formulas of a whole row: inlined by Numba itself, else LLVM leaves a call and no SIMD.
 inline = njit(error_model="numpy", fastmath=FASTMATH, inline="always")
@@ -32,49 +32,43 @@ def tension(a, b, v, l, n, f, A):
 
 @loop
 def stress(out, Y0, Y1, Y2, runs, s, numbers, law, centre, period):
-    """Derivatives of D_ε E at each node of the runs: out[:9, I] by ∇Y (-D FᵀT, by rows), out[9:, I] by Ȳ.
+    """Derivatives of D_ε E + S_ε E_s at each node of the runs: out[:9, I] by ∇Y (-FᵀT, by rows), out[9:, I] by Ȳ.
 
-    T = Σ E_i' Z_i C_i - κ(j - 1)j I + κ_s|v|²(Fm⊗Fm - |Fm|²n⊗n), j = det ∇Y/weight, v = ∇Yᵀm = |v|n; by Ȳ it is
-    D'Em + D(∂m/∂Y)ᵀk, k = -2Fᵀ[(e₁ + e₂TrA)I - e₂A]Fm + κ_s(|v|²FᵀFm + |Fm|²∇Y v).
+    T = D[Σ E_i' Z_i C_i - κ(j - 1)j I] + S κ_s|v|²(Fm⊗Fm - |Fm|²n⊗n), j = det ∇Y/weight, v = ∇Yᵀm = |v|n; by Ȳ it is
+    (D'E + S'E_s)m + (∂m/∂Y)ᵀk, k = -2DFᵀ[(e₁ + e₂TrA)I - e₂A]Fm + S κ_s(|v|²FᵀFm + |Fm|²∇Y v).
     """
-    x, y, h, eps, radius = s[0], s[1], numbers[0], numbers[1], numbers[2]
+    x, y, h, eps, radius, skin = s[0], s[1], numbers[0], numbers[1], numbers[2], numbers[8]
     for t in prange(runs.shape[0]):
         for I in range(runs[t, 0], runs[t, 0] + runs[t, 1]):
             r, w, det = place(Y0, Y1, Y2, I, x, y, h, centre, period)
             distance = np.sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]) + TINY
-            phi = (distance - radius) / eps
-            if abs(phi) >= 1.0:
+            D, D1 = dirac(distance - radius, eps, numbers[3])
+            S, S1 = dirac(distance - radius, skin, numbers[3])
+            if D == 0.0 and S == 0.0:
                 for j in range(12):
                     out[j, I] = 0.0
                 continue
             m = (r[0] / distance, r[1] / distance, r[2] / distance)
             F, f, n, A, trace, size, Z1, Z2 = surface(w, det, m)
             E, dE1, dE2, _, _ = energy(law, numbers[4], numbers[5], Z1, Z2)
-            D = numbers[3] * 0.5 * (1.0 + np.cos(np.pi * phi)) / eps
-            slope = -numbers[3] * 0.5 * np.pi * np.sin(np.pi * phi) / (eps * eps)
-            a, b, change = dE1 * Z1 - dE2 * Z2, dE2 / Z1, det / numbers[3] - 1.0
-            E += 0.5 * numbers[6] * change * change
-            v = numbers[6] * change * (1.0 + change)
-            slid = sliding(f, size)
-            E += 0.5 * numbers[7] * slid
-            d = numbers[7] * (1.0 + slid)  # stress of slip: l Fm⊗Fm - d n⊗n
-            l = numbers[7] * size * size
-            a, v = a + d, v + d
-            T = tension(a, b, v, l, n, f, A)
+            swollen, slid = det / numbers[3], sliding(f, size)
+            E = D1 * (E + 0.5 * numbers[6] * (swollen - 1.0) ** 2) + 0.5 * S1 * numbers[7] * slid
+            v = D * numbers[6] * (swollen - 1.0) * swollen
+            d, l = S * numbers[7] * (1.0 + slid), S * numbers[7] * size * size
+            T = tension(D * (dE1 * Z1 - dE2 * Z2) + d, D * dE2 / Z1, v + d, l, n, f, A)
             for j in range(3):
                 column = transposed(F, (T[j], T[3 + j], T[6 + j]))
                 for q in range(3):
-                    out[3 * q + j, I] = -D * column[q]
-            e1, e2 = 0.5 * dE2 / Z1, 0.5 * (dE1 - dE2 * Z2 / Z1) / Z1
+                    out[3 * q + j, I] = -column[q]
+            e2 = 0.5 * D * (dE1 - dE2 * Z2 / Z1) / Z1
+            c = 0.5 * D * dE2 / Z1 + e2 * trace - 0.5 * l
             g = times((A[0], A[3], A[4], A[3], A[1], A[5], A[4], A[5], A[2]), f)
-            c = e1 + e2 * trace
-            c -= 0.5 * l
             k = transposed(F, (c * f[0] - e2 * g[0], c * f[1] - e2 * g[1], c * f[2] - e2 * g[2]))
             o, d = times(w, n), 0.5 * d / size
             k = (k[0] - d * o[0], k[1] - d * o[1], k[2] - d * o[2])
             along = k[0] * m[0] + k[1] * m[1] + k[2] * m[2]
             for q in range(3):
-                out[9 + q, I] = slope * E * m[q] - 2.0 * D * (k[q] - along * m[q]) / distance
+                out[9 + q, I] = E * m[q] - 2.0 * (k[q] - along * m[q]) / distance
 
 
 @inline

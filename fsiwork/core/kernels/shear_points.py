@@ -132,3 +132,13 @@ def surface(w, det, m):
 def sliding(f, size):
     """tan² of the angle between Fm and n: by how much the layers of the band slide over each other."""
     return (f[0] * f[0] + f[1] * f[1] + f[2] * f[2]) * size * size - 1.0
+
+
+@point
+def dirac(phi, eps, weight):
+    """weight D_ε(φ) by the cosine and its derivative by φ; 0 outside of |φ| < ε."""
+    q = phi / eps
+    if abs(q) >= 1.0:
+        return 0.0, 0.0
+    k = 0.5 * weight / eps
+    return k * (1.0 + np.cos(np.pi * q)), -k * np.pi * np.sin(np.pi * q) / eps

@@ -7,7 +7,7 @@ import numpy as np
 from numba import prange
 
 from fsiwork.core.kernels import loop
-from fsiwork.core.kernels.shear_points import TINY, corner, energy, near, place, sliding, stiffness, surface
+from fsiwork.core.kernels.shear_points import TINY, corner, dirac, energy, near, place, sliding, stiffness, surface
 
 ENERGY, AREA, SHEARED, SQUARES, LEAST_DET, LEAST1, MOST1, LEAST2, MOST2, STIFF = range(10)  # columns of `survey`
 SUMS = 4  # of them, the first
@@ -26,17 +26,19 @@ def survey(out, Y0, Y1, Y2, runs, s, numbers, law, centre, period):
         for I in range(runs[t, 0], runs[t, 0] + runs[t, 1]):
             r, w, det = place(Y0, Y1, Y2, I, x, y, h, centre, period)
             distance = np.sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]) + TINY
-            phi = (distance - radius) / eps
-            if abs(phi) >= 1.0:
+            D, _ = dirac(distance - radius, eps, 1.0)
+            S, _ = dirac(distance - radius, numbers[8], 0.5 * numbers[3] * numbers[7])
+            if D == 0.0 and S == 0.0:
                 continue
             m = (r[0] / distance, r[1] / distance, r[2] / distance)
             _, f, _, _, _, size, Z1, Z2 = surface(w, det, m)
-            E, dE1, dE2, ddE1, ddE2 = energy(law, numbers[4], numbers[5], Z1, Z2)
-            D, change = 0.5 * (1.0 + np.cos(np.pi * phi)) / eps, det / numbers[3]
-            E += 0.5 * numbers[6] * (change - 1.0) * (change - 1.0)
             slid = sliding(f, size)
-            E += 0.5 * numbers[7] * slid
-            out[t, ENERGY] += numbers[3] * D * E
+            out[t, ENERGY] += S * slid
+            if D == 0.0:
+                continue
+            E, dE1, dE2, ddE1, ddE2 = energy(law, numbers[4], numbers[5], Z1, Z2)
+            change = det / numbers[3]
+            out[t, ENERGY] += numbers[3] * D * (E + 0.5 * numbers[6] * (change - 1.0) * (change - 1.0))
             out[t, AREA] += D * size
             out[t, SHEARED] += (Z2 - 1.0) * D * size
             out[t, SQUARES] += (change - 1.0) * (change - 1.0) * D * size
@@ -75,23 +77,24 @@ def distances(phi, Y0, Y1, Y2, centre, period, radius):
 
 @loop
 def densities(out, Y0, Y1, Y2, runs, s, numbers, law, centre, period):
-    """out = D(E + n·Tn) at each node of the runs.
+    """out = D E + S E_s + n·Tn at each node of the runs.
 
-    The force is ∇(D E) + div(D T); with n·Tn I taken out of T, what is left of T is tension, and drag between layers.
+    The force is ∇(D E + S E_s) + div T; with n·Tn I taken out of T, what is left of T is tension, and drag between
+    layers.
     """
     x, y, h, eps, radius = s[0], s[1], numbers[0], numbers[1], numbers[2]
     for t in prange(runs.shape[0]):
         for I in range(runs[t, 0], runs[t, 0] + runs[t, 1]):
             r, w, det = place(Y0, Y1, Y2, I, x, y, h, centre, period)
             distance = np.sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]) + TINY
-            phi = (distance - radius) / eps
             out[I] = 0.0
-            if abs(phi) >= 1.0:
+            D, _ = dirac(distance - radius, eps, numbers[3])
+            S, _ = dirac(distance - radius, numbers[8], numbers[3])
+            if D == 0.0 and S == 0.0:
                 continue
             m = (r[0] / distance, r[1] / distance, r[2] / distance)
             _, f, _, _, _, size, Z1, Z2 = surface(w, det, m)
             E = energy(law, numbers[4], numbers[5], Z1, Z2)[0]
             j = det / numbers[3]
             # ½κ(j - 1)² - κ(j - 1)j, and ½κ_s tan² - κ_s tan²
-            E -= 0.5 * numbers[6] * (j * j - 1.0) + 0.5 * numbers[7] * sliding(f, size)
-            out[I] = numbers[3] * 0.5 * (1.0 + np.cos(np.pi * phi)) / eps * E
+            out[I] = D * (E - 0.5 * numbers[6] * (j * j - 1.0)) - 0.5 * S * numbers[7] * sliding(f, size)
