@@ -60,7 +60,7 @@ def band(n: int = 512, seconds: float = 2.0) -> Row:
     return row("band", took["full"] / took["band"], "times faster than everywhere", ">= 5", note=note)
 
 
-def speedup(n: int, times: int = 300) -> float:
+def speedup(n: int, times: int = 3000) -> float:
     """Least time of a stage with one thread over that with two [wall clock]; in a process that has two."""
     action, best = stage("weno5", n, 2), {1: np.inf, 2: np.inf}
     for _ in range(times):
