@@ -4,9 +4,10 @@ import errno
 import json
 import os
 import shutil
+import time
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -99,6 +100,39 @@ def load_state(path: Path, prefix: str = "") -> tuple[Arrays, dict[str, Any]]:
         raise Damaged(f"{path}: damaged checkpoint ({type(error).__name__})") from error
     except (zipfile.BadZipFile, zlib.error, MemoryError, OverflowError, SyntaxError) as error:
         raise Damaged(f"{path}: damaged checkpoint ({type(error).__name__})") from error
+
+
+class Kept:
+    """The state of a long computation, one file ``NAME.state``, from which the next try goes on.
+
+    Parameters
+    ----------
+    path : the file
+    identity : what a state must agree with (scene, sources); another one is as good as none
+    every : least time between two states [s]
+    """
+
+    def __init__(self, path: Path, identity: dict[str, str], every: float = 60.0):
+        self.path, self.identity, self.every = Path(path), identity, every
+        self._last = time.monotonic()
+
+    def load(self) -> Arrays | None:
+        """The newest state, or None when there is no good one."""
+        try:
+            state, meta = load_state(self.path)
+        except (FileNotFoundError, Damaged):
+            return None
+        return state if meta == self.identity else None
+
+    def save(self, state: Callable[[], Arrays]) -> None:
+        """Keep what ``state`` returns, unless the last one is younger than ``every``."""
+        if time.monotonic() - self._last >= self.every:
+            save_state(self.path, state(), self.identity)
+            self._last = time.monotonic()
+
+    def drop(self) -> None:
+        """It is done: the file is no longer needed."""
+        self.path.unlink(missing_ok=True)
 
 
 class Store:

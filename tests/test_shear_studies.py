@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from fsiwork.checkpoint import Kept
 from fsiwork.scene import load
 from fsiwork.studies import shear
 from fsiwork.studies import shear_measures as measures
@@ -76,6 +77,34 @@ def test_a_short_run_tells_everything():
         assert "p_x_1" not in found
         assert np.abs(np.linalg.norm(found["markers_0"].reshape(-1, 3), axis=1) - 0.5).max() < 1e-12
         assert 0.0 < found["away"] < 0.05
+
+
+def test_a_run_goes_on_from_what_it_kept(tmp_path):
+    """Killed at a frame and started anew: the same numbers to the last bit; a state of another scene is not taken."""
+    scene = load(SCENE, {"box.cells": 16, "bodies.0.width": {"cells": 2}, "clock.end": 0.2, "clock.frames": 4})
+
+    class Killed(Exception):
+        pass
+
+    class Once(Kept):
+        def save(self, state):
+            super().save(state)
+            raise Killed
+
+    path, mine = tmp_path / "run.state", {"scene": "mine"}
+    whole = shear.relax(scene, {})
+    with pytest.raises(Killed):
+        shear.relax(scene, {}, Once(path, mine, every=0.0))
+    assert Kept(path, {"scene": "another"}).load() is None
+    steps = int(Kept(path, mine).load()["sim/clock"][1])
+    assert 0 < steps < whole["n_steps"]
+    rest = shear.relax(scene, {}, Kept(path, mine, every=0.0))
+    assert rest.keys() == whole.keys()
+    for name, value in whole.items():
+        np.testing.assert_array_equal(np.asarray(rest[name][1] if isinstance(value, tuple) else rest[name]),
+                                      np.asarray(value[1] if isinstance(value, tuple) else value), name)  # fmt: skip
+    path.write_bytes(path.read_bytes()[:-100])
+    assert Kept(path, mine).load() is None
 
 
 def dataset(**changes):

@@ -3,6 +3,7 @@
 The solver and the scenes are loaded only where something is computed: most jobs of the book join, measure or draw.
 """
 
+import inspect
 import json
 import time
 from collections.abc import Iterable
@@ -12,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from fsiwork import joining, provenance, sources
-from fsiwork.checkpoint import replacing
+from fsiwork.checkpoint import Kept, replacing
 from fsiwork.netcdf import opened
 from fsiwork.targets import Plan, Point, Study
 
@@ -47,11 +48,15 @@ def _calls(study: Study, path: Path | None, points: list[Point], out: Path) -> P
     from fsiwork.studies.sweep import resolve
 
     function = resolve(study.call, "studies")
+    lasting = "kept" in inspect.signature(function).parameters
     results, costs = [], []
     for point in points:
         made = scene.load(path, point.overrides) if path else None
         start = time.process_time()
-        found = function(made, {**study.args, **point.coords})
+        if lasting:
+            found = _lasting(function, made, {**study.args, **point.coords}, out.with_name(f"{point.name}.state"))
+        else:
+            found = function(made, {**study.args, **point.coords})
         spent = time.process_time() - start
         print(f"{point.name}: {spent:.2f} s", flush=True)
         cells = made.box.cells if made else 0
@@ -61,6 +66,20 @@ def _calls(study: Study, path: Path | None, points: list[Point], out: Path) -> P
     _write_json(out, results)
     _write_json(provenance.cost_path(out), costs)
     return out
+
+
+def _lasting(function, scene, point: dict[str, Any], path: Path) -> dict[str, Any]:
+    """A function that goes on from its own state after it was killed."""
+    words = scene.model_dump_json() + json.dumps(point)
+    identity = {
+        "scene": sources.scene_id(words),
+        "source": sources.source_hash(),
+        "studies": sources.source_hash("studies"),
+    }
+    kept = Kept(path, identity)
+    found = function(scene, point, kept=kept)
+    kept.drop()
+    return found
 
 
 def _plain(value: Any) -> Any:

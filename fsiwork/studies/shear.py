@@ -8,6 +8,7 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 
 from fsiwork import simulate
+from fsiwork.checkpoint import Kept
 from fsiwork.core.grid import GHOSTS, Grid
 from fsiwork.core.kernels.shear_survey import LEAST_DET
 from fsiwork.scene import Scene
@@ -103,6 +104,24 @@ class Watched:
         self._points = self._points + self.sim.dt * self._velocity(halfway)
         self._least = min(self._least, float(self.sim.bodies[0].survey()[LEAST_DET]))
 
+    def state(self) -> dict[str, np.ndarray]:
+        """All that `restore` needs to go on."""
+        parts = {"sim": self.sim.state(), "table": self.table, "found": self.found}
+        state = {f"{part}/{name}": value for part, values in parts.items() for name, value in values.items()}
+        return state | {"points": self._points, "sums": np.array([self._total, self._made, self._least])}
+
+    def restore(self, state: dict[str, np.ndarray]) -> None:
+        """Go on from a `state` at a frame."""
+        parts: dict[str, dict[str, np.ndarray]] = {"sim": {}, "table": {}, "found": {}}
+        for key, value in state.items():
+            part, _, name = key.partition("/")
+            if name:
+                parts[part][name] = value
+        self.sim.restore(parts["sim"])
+        self.table, self.found, self._points = parts["table"], parts["found"], state["points"]
+        self._total, self._made, self._least = map(float, state["sums"])
+        self._due = [one for one in self._due if self.sim.t < one[0] - 1e-9]
+
     def _velocity(self, points: np.ndarray) -> np.ndarray:
         flow = self.sim.flow
         return np.stack([at(flow.grid, q, points, face=a) for a, q in enumerate(flow.u)], -1)
@@ -126,17 +145,23 @@ class Watched:
             self.found[f"phi_{name}{suffix}"] = at(flow.grid, phi, points)
 
 
-def relax(scene: Scene, point: dict[str, Any]) -> dict[str, Any]:
+def relax(scene: Scene, point: dict[str, Any], kept: Kept | None = None) -> dict[str, Any]:
     """Run a scene with one sphere: gauges at its frames, the most energy created so far, pressure on the axes, markers;
-    the largest deviation from the sphere at the end."""
+    the largest deviation from the sphere at the end. Goes on from what ``kept`` has of an earlier try."""
     run, ended = Watched(scene), ""
     sim, spec = run.sim, scene.bodies[0]
-    run.look()
+    before = kept and kept.load()
+    if before:
+        run.restore(before)
+    else:
+        run.look()
     while sim.frame_number < scene.clock.frames and not (ended := sim.advance()):
         run.follow()
         while sim.at_frame() and sim.frame_number < scene.clock.frames:
             sim.frame_number += 1
             run.look()
+            if kept:
+                kept.save(run.state)
     out = run.found | {name: (("row",), values) for name, values in run.table.items()}
     away = math.nan if ended else _roundness(sim, spec.shape.radius)
     return out | {"away": away, "eps": spec.width.of(scene.box.h), "ended": ended or "complete", "n_steps": sim.steps}
