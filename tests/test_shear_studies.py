@@ -1,15 +1,18 @@
 """What the studies of the sheared sphere measure, on profiles and runs whose answers are known."""
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
+import yaml
 
 from fsiwork.checkpoint import Kept
 from fsiwork.scene import load
-from fsiwork.studies import shear
+from fsiwork.studies import jobs, shear
 from fsiwork.studies import shear_measures as measures
+from fsiwork.targets import Plan
 
 SCENE = Path(__file__).resolve().parents[1] / "configs" / "scenes" / "sheared_sphere.yaml"
 
@@ -105,6 +108,25 @@ def test_a_run_goes_on_from_what_it_kept(tmp_path):
                                       np.asarray(value[1] if isinstance(value, tuple) else value), name)  # fmt: skip
     path.write_bytes(path.read_bytes()[:-100])
     assert Kept(path, mine).load() is None
+
+
+def test_a_job_keeps_its_state_until_it_is_done(tmp_path, monkeypatch):
+    (tmp_path / "studies").mkdir()
+    (tmp_path / "scenes").symlink_to(SCENE.parent)
+    small = {"box.cells": 16, "bodies.0.width": {"cells": 2}, "clock.end": 0.1, "clock.frames": 2}
+    study = {"title": "short", "scene": "sheared_sphere", "kind": "call", "call": "shear.relax", "set": small}
+    (tmp_path / "studies" / "short.yaml").write_text(yaml.safe_dump(study))
+    (tmp_path / "book.yaml").write_text("{}")
+    plan, seen = Plan(tmp_path, tmp_path / "results"), []
+    monkeypatch.setattr(Kept, "save", lambda kept, state: seen.append(kept))
+    (file,) = jobs.compute(plan, plan.study("short", "coarse"), "all", "coarse")
+    assert json.loads(file.read_text())[0]["ended"] == "complete"
+    assert len(seen) == 2
+    assert seen[0].path.parent == file.parent
+    seen[0].path.write_bytes(b"not a state")
+    assert seen[0].load() is None
+    jobs.compute(plan, plan.study("short", "coarse"), "all", "coarse")
+    assert [entry.name for entry in file.parent.glob("*.state")] == []
 
 
 def dataset(**changes):

@@ -70,9 +70,9 @@ def _calls(study: Study, path: Path | None, points: list[Point], out: Path) -> P
 
 def _lasting(function, scene, point: dict[str, Any], path: Path) -> dict[str, Any]:
     """A function that goes on from its own state after it was killed."""
-    words = scene.model_dump_json() + json.dumps(point)
     identity = {
-        "scene": sources.scene_id(words),
+        "scene": sources.scene_id(scene.model_dump_json()),
+        "point": json.dumps(point),
         "source": sources.source_hash(),
         "studies": sources.source_hash("studies"),
     }
