@@ -82,9 +82,11 @@ def test_a_short_run_tells_everything():
         assert 0.0 < found["away"] < 0.05
 
 
-def test_a_run_goes_on_from_what_it_kept(tmp_path):
+@pytest.mark.parametrize(("step", "frame"), [(0.004, 1), ("auto", 3)])
+def test_a_run_goes_on_from_what_it_kept(tmp_path, step, frame):
     """Killed at a frame and started anew: the same numbers to the last bit; a state of another scene is not taken."""
-    scene = load(SCENE, {"box.cells": 16, "bodies.0.width": {"cells": 2}, "clock.end": 0.2, "clock.frames": 4})
+    changes = {"box.cells": 16, "bodies.0.width": {"cells": 2}, "clock": {"end": 0.2, "step": step, "frames": 4}}
+    scene = load(SCENE, changes)
 
     class Killed(Exception):
         pass
@@ -92,7 +94,8 @@ def test_a_run_goes_on_from_what_it_kept(tmp_path):
     class Once(Kept):
         def save(self, state):
             super().save(state)
-            raise Killed
+            if state()["sim/clock"][2] == frame:
+                raise Killed
 
     path, mine = tmp_path / "run.state", {"scene": "mine"}
     whole = shear.relax(scene, {})
