@@ -32,7 +32,7 @@ REASON = re.compile(r"t=\S+.*(cell \(|exceeds|solver|energy)")
 
 
 class Run(NamedTuple):
-    """How a run went: its outcome, why (or nothing), times and half-axis along x, Δt at first, number of steps."""
+    """How a run went: its outcome, why (or nothing), times and half-axis along x, Δt at the end, number of steps."""
 
     outcome: int
     why: str
