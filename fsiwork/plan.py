@@ -155,13 +155,14 @@ def _fields(scene: Scene) -> list[tuple[str, int]]:
         carry = _carried(body, dim)
         linear = getattr(body.energy, "kind", "") == "linear"
         form = body.form if body.form != "auto" else "normal-tangential" if linear else "divergence"
-        pull = 1 + (form != "divergence") + dim * (form == "split")
+        pull = 2 * dim + 4 if form == "adjoint" else 1 + (form != "divergence") + dim * (form == "split")
         copies = 2 + dim * (body.transport.dtype != "float64")
         found += [(f"body {i}: φ{', Y' * (carry > 1)}", carry), (f"body {i}: tension, copies", pull + copies)]
         if body.coupling == "semi-implicit":
             found += [(f"body {i}: φ̃", 2)]
         if carry > 1:
-            found += [(f"body {i}: φ₀(Y)", dim + 2)]
+            found += [(f"body {i}: φ₀(Y)", dim + 2 + bool(body.transport.restart))]
+        found += [(f"body {i}: bending", 3 * bool(body.bending)), (f"body {i}: lines anew", 2 * bool(body.renew))]
     return found
 
 
@@ -258,22 +259,35 @@ def _step(scene: Scene) -> float:
         limits.append(0.5 * h / speed)
     if fluid and fluid.diffusion == "explicit" and fluid.viscosity > 0:
         limits.append(h**2 * fluid.density / (4 * scene.box.dim * fluid.viscosity))
-    for body in scene.bodies:
-        tension = _tension(body) if isinstance(body, Membrane | Markers | Curve | ShearMembrane) else 0.0
-        if tension > 0:
-            inside = getattr(body, "inside", None)
-            rho = min(fluid.density, inside.density) if inside else fluid.density
-            mu = min(fluid.viscosity, inside.viscosity) if inside else fluid.viscosity
-            eps = 2.0 * h if isinstance(body, Markers) else body.width.of(h)
-            if isinstance(body, Markers | Curve):
-                tension /= eps ** (scene.box.dim - 2)  # of a line in space
-            limit = (mu * eps + math.hypot(mu * eps, math.sqrt(0.5 * tension * rho * eps) * h)) / tension
-            limits.append(limit * (1.0 if getattr(body, "coupling", "explicit") == "explicit" else 4.0))
+    limits += [limit for body in scene.bodies for limit in _of_body(scene, body)]
     return min(scene.clock.end, scene.clock.safety * min(limits))
 
 
+def _of_body(scene: Scene, body: Body) -> list[float]:
+    """Limits of the tension (1.54) and of bending, as `bodies.membrane` has them."""
+    tension = _tension(body) if isinstance(body, Membrane | Markers | Curve | ShearMembrane) else 0.0
+    if not tension > 0:
+        return []
+    h, fluid, inside = scene.box.h, scene.fluid, getattr(body, "inside", None)
+    rho = min(fluid.density, inside.density) if inside else fluid.density
+    mu = min(fluid.viscosity, inside.viscosity) if inside else fluid.viscosity
+    damped = inside or getattr(body, "surface_mass", 0.0) or fluid.diffusion == "backward-euler"
+    eps = 2.0 * h if isinstance(body, Markers) else body.width.of(h)
+    if isinstance(body, Markers | Curve):
+        tension /= eps ** (scene.box.dim - 2)  # of a line in space
+    gain, coupling = mu * eps if damped else 0.0, getattr(body, "coupling", "explicit")
+    limit = (gain + math.hypot(gain, math.sqrt(0.5 * tension * rho * eps) * h)) / tension
+    smooth = coupling in ("stabilised", "iterated")
+    drop = isinstance(body, Membrane) and getattr(body.energy, "kind", "") == "linear"
+    limits = [limit * (4.0 if smooth or (coupling == "semi-implicit" and drop) else 1.0)]
+    if getattr(body, "bending", 0.0):
+        slope = body.stretch if body.dirac == "plain" or (body.dirac == "auto" and drop) else 1.0
+        limits.append(0.5 * h**2 * math.sqrt(rho * eps / (body.bending * slope)) * (10.0 if smooth else 1.0))
+    return limits
+
+
 def _tension(body: Membrane | Markers | Curve | ShearMembrane) -> float:
-    """s E'(s) and for a hardly stretched membrane its modulus, at the first stretch s; with shear, both moduli."""
+    """s E'(s), or the modulus of small waves where that is larger, at the first stretch s; with shear, both moduli."""
     if isinstance(body, ShearMembrane):
         return body.area + body.shear
     s, law = body.stretch, body.energy
@@ -281,8 +295,10 @@ def _tension(body: Membrane | Markers | Curve | ShearMembrane) -> float:
     if kind == "linear":
         return s * law.stiffness
     if kind == "quadratic":
-        return law.stiffness * max(s * (s - 1.0), s * s)
-    return max(float(s * law.dE(s)), float(s * s * law.ddE(s)))
+        A, B = law.stiffness * s * (s - 1.0), law.stiffness * s * s
+    else:
+        A, B = float(s * law.dE(s)), float(s * s * law.ddE(s))
+    return max(A, 0.0) if max(2.0 * A, 0.0) >= B else B * B / (4.0 * (B - A))
 
 
 def _speed(scene: Scene) -> float:

@@ -211,6 +211,34 @@ def test_plan_counts_the_steps_and_the_fields():
     assert ("pressure", "multigrid") in [(what, which) for what, which, _ in mixed.solvers]
 
 
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("elliptic_membrane", {}),  # the book's predictor takes the explicit step, Crank-Nicolson damps nothing
+        ("elliptic_membrane", {"fluid.diffusion": "backward-euler", "bodies.0.coupling": "stabilised"}),
+        ("oscillating_drop", {}),
+        ("rising_drop", {}),
+        ("bent_membrane", {"bodies.0.coupling": "explicit"}),
+        ("bent_membrane", {"bodies.0.dirac": "plain", "bodies.0.stretch": 1.2}),
+        ("twin", {}),
+        ("fibre", {}),
+    ],
+)
+def test_the_planned_step_is_that_of_a_run(name, changes):
+    from fsiwork.simulate import build, longest_step
+
+    scene = load(SCENES / f"{name}.yaml", {"box.cells": 32, "clock.step": "auto"} | changes)
+    sim = build(scene)
+    taken = scene.clock.safety * min(longest_step(sim.flow, sim.bodies).values())
+    assert estimate(scene).step == pytest.approx(min(taken, scene.clock.end), rel=0.05)
+
+
+def test_the_plan_counts_what_a_form_of_the_force_takes():
+    settings = {"bodies.0.form": "adjoint", "bodies.0.transport.scheme": "upwind5"}
+    usual, adjoint = (estimate(load(SCENES / "elliptic_membrane.yaml", s)) for s in ({}, settings))
+    assert sum(count for _, count, _ in adjoint.fields) == sum(count for _, count, _ in usual.fields) + 7
+
+
 def test_the_planned_time_is_that_of_a_run():
     from fsiwork.simulate import frames
 
