@@ -6,7 +6,7 @@ Arithmetic on the scene alone: nothing of the solver is loaded.
 import math
 from dataclasses import dataclass
 
-from fsiwork.scene import Body, Curve, Markers, Membrane, Scene, SceneError, ShearMembrane
+from fsiwork.scene import Body, Bubbles, Curve, Fluid, Markers, Membrane, Scene, SceneError, ShearMembrane
 
 GHOSTS = 3  # as in core.grid, which this module does not load
 SHARE = 0.8  # of the available memory
@@ -146,10 +146,10 @@ def _fields(scene: Scene) -> list[tuple[str, int]]:
         return passive + [line for i, body in enumerate(scene.bodies) for line in _passive(i, body, dim)]
     found = [("velocity: now, next, rate", 3 * dim), ("pressure, viscosity", 3), ("force", dim * bool(scene.bodies))]
     if _variable(scene):
-        other = any(b.inside and b.inside.viscosity != fluid.viscosity for b in scene.bodies)
+        other = any(b.inside and _viscosity(b, fluid) != fluid.viscosity for _, b in _membranes(scene))
         found += [("mixture: ρ, μ, 1/ρ on faces, ψ", dim + 2 + other), ("force", 0 if scene.bodies else dim)]
     for i, body in enumerate(scene.bodies):
-        if not isinstance(body, Membrane):
+        if not isinstance(body, Membrane | Bubbles):
             found += _passive(i, body, dim)
             continue
         carry = _carried(body, dim)
@@ -162,7 +162,8 @@ def _fields(scene: Scene) -> list[tuple[str, int]]:
             found += [(f"body {i}: φ̃", 2)]
         if carry > 1:
             found += [(f"body {i}: φ₀(Y)", dim + 2 + bool(body.transport.restart))]
-        found += [(f"body {i}: bending", 3 * bool(body.bending)), (f"body {i}: lines anew", 2 * bool(body.renew))]
+        if isinstance(body, Membrane):
+            found += [(f"body {i}: bending", 3 * bool(body.bending)), (f"body {i}: lines anew", 2 * bool(body.renew))]
     return found
 
 
@@ -174,8 +175,14 @@ def _passive(i: int, body: Body, dim: int) -> list[tuple[str, int]]:
     return [(f"body {i}: φ{', Y' * (carry > 1)}", carry), (f"body {i}: stages, u at centres, scratch", 4 + dim)]
 
 
-def _membranes(scene: Scene) -> list[tuple[int, Membrane]]:
-    return [(i, body) for i, body in enumerate(scene.bodies) if isinstance(body, Membrane)]
+def _membranes(scene: Scene) -> list[tuple[int, Membrane | Bubbles]]:
+    return [(i, body) for i, body in enumerate(scene.bodies) if isinstance(body, Membrane | Bubbles)]
+
+
+def _viscosity(body: Membrane | Bubbles, fluid: Fluid) -> float:
+    """Of the fluid inside; that of the fluid around it where none is given."""
+    own = body.inside.viscosity
+    return fluid.viscosity if own is None else own
 
 
 def _solvers(scene: Scene, step: float) -> list[tuple[str, str, float]]:
@@ -190,7 +197,7 @@ def _solvers(scene: Scene, step: float) -> list[tuple[str, str, float]]:
     alpha = 0.0
     if fluid.diffusion != "explicit":
         nu = [(fluid.viscosity, fluid.density)]
-        nu += [(b.inside.viscosity, b.inside.density) for _, b in membranes if b.inside]
+        nu += [(_viscosity(b, fluid), b.inside.density) for _, b in membranes if b.inside]
         worst = max(mu for mu, _ in nu) / min(rho for _, rho in nu) if variable else fluid.viscosity / fluid.density
         alpha = (0.5 if fluid.diffusion == "implicit" and not variable else 1.0) * step * worst / h**2
     if variable and alpha > 0.0:
@@ -223,7 +230,7 @@ def _stages(scene: Scene, solvers) -> list[tuple[str, float]]:
             found.append(("φ from the map", 1.0))
         if anew := getattr(body, "redistance", None):
             found.append(("distance anew", 1.0 / anew.every))
-        if not isinstance(body, Membrane):
+        if not isinstance(body, Membrane | Bubbles):
             continue
         found.append(("force", 1.0))
         if body.coupling == "semi-implicit":
@@ -265,12 +272,12 @@ def _step(scene: Scene) -> float:
 
 def _of_body(scene: Scene, body: Body) -> list[float]:
     """Limits of the tension (1.54) and of bending, as `bodies.membrane` has them."""
-    tension = _tension(body) if isinstance(body, Membrane | Markers | Curve | ShearMembrane) else 0.0
+    tension = _tension(body) if isinstance(body, Membrane | Bubbles | Markers | Curve | ShearMembrane) else 0.0
     if not tension > 0:
         return []
     h, fluid, inside = scene.box.h, scene.fluid, getattr(body, "inside", None)
     rho = min(fluid.density, inside.density) if inside else fluid.density
-    mu = min(fluid.viscosity, inside.viscosity) if inside else fluid.viscosity
+    mu = min(fluid.viscosity, _viscosity(body, fluid)) if inside else fluid.viscosity
     damped = inside or getattr(body, "surface_mass", 0.0) or fluid.diffusion == "backward-euler"
     eps = 2.0 * h if isinstance(body, Markers) else body.width.of(h)
     if isinstance(body, Markers | Curve):
@@ -278,7 +285,7 @@ def _of_body(scene: Scene, body: Body) -> list[float]:
     gain, coupling = mu * eps if damped else 0.0, getattr(body, "coupling", "explicit")
     limit = (gain + math.hypot(gain, math.sqrt(0.5 * tension * rho * eps) * h)) / tension
     smooth = coupling in ("stabilised", "iterated")
-    drop = isinstance(body, Membrane) and getattr(body.energy, "kind", "") == "linear"
+    drop = isinstance(body, Membrane | Bubbles) and getattr(body.energy, "kind", "") == "linear"
     limits = [limit * (4.0 if smooth or (coupling == "semi-implicit" and drop) else 1.0)]
     if getattr(body, "bending", 0.0):
         slope = body.stretch if body.dirac == "plain" or (body.dirac == "auto" and drop) else 1.0
@@ -286,7 +293,7 @@ def _of_body(scene: Scene, body: Body) -> list[float]:
     return limits
 
 
-def _tension(body: Membrane | Markers | Curve | ShearMembrane) -> float:
+def _tension(body: Membrane | Bubbles | Markers | Curve | ShearMembrane) -> float:
     """s E'(s), or the modulus of small waves where that is larger, at the first stretch s; with shear, both moduli."""
     if isinstance(body, ShearMembrane):
         return body.area + body.shear

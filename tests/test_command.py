@@ -209,6 +209,9 @@ def test_plan_counts_the_steps_and_the_fields():
     assert finer.bytes > plan.bytes and finer.seconds > plan.seconds
     mixed = estimate(load(SCENES / "rising_drop.yaml"))
     assert ("pressure", "multigrid") in [(what, which) for what, which, _ in mixed.solvers]
+    parts = [{"shape": {"kind": "disc", "centre": [0.5, y], "radius": 0.1}, "density": 0.1} for y in (0.3, 0.7)]
+    bubbles = estimate(load(SCENES / "bubbles.yaml", {"bodies.0.parts": parts, "bodies.0.viscosity": 0.01}))
+    assert ("pressure", "multigrid") in [(what, which) for what, which, _ in bubbles.solvers]
 
 
 @pytest.mark.parametrize(
@@ -220,6 +223,7 @@ def test_plan_counts_the_steps_and_the_fields():
         ("rising_drop", {}),
         ("bent_membrane", {"bodies.0.coupling": "explicit"}),
         ("bent_membrane", {"bodies.0.dirac": "plain", "bodies.0.stretch": 1.2}),
+        ("bubbles", {"bodies.0.tension": 0.5}),
         ("twin", {}),
         ("fibre", {}),
     ],
