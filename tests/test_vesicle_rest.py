@@ -17,6 +17,7 @@ from fsiwork.scene import SceneError, load
 from fsiwork.studies import jobs
 from fsiwork.studies import vesicle_rest as study
 from fsiwork.studies.vesicles import equilibrium
+from fsiwork.targets import Plan
 
 CONFIGS = Path(__file__).resolve().parents[1] / "configs"
 SCENE = CONFIGS / "scenes" / "vesicle_rest.yaml"
@@ -76,6 +77,16 @@ def test_starts_of_the_study_have_their_volume_and_rest_area():
         assert inside == pytest.approx(4 / 3 * math.pi * float(volume), rel=1e-4), case
         tension = equilibrium(float(volume), branch).tension
         assert area / spec.stretch == pytest.approx(4 * math.pi / (1 + tension / 100), rel=2e-4), case
+
+
+@pytest.mark.parametrize("size", ["coarse", "book"])
+@pytest.mark.parametrize("name", ["vesicle_rest", "vesicle_shear"])
+def test_runs_that_are_looked_at_by_their_steps_know_how_many(name, size):
+    """With an automatic step nothing would be stepped, and nothing would seem to change."""
+    plan = Plan(CONFIGS)
+    runs = plan.study(name, size)
+    clocks = [load(plan.scene(runs), point.overrides).clock for point in runs.points]
+    assert len(clocks) >= 4 and all(clock.step != "auto" for clock in clocks)
 
 
 def _tablet(R, e):
