@@ -110,11 +110,17 @@ class Kept:
     path : the file
     identity : what a state must agree with (scene, sources); another one is as good as none
     every : least time between two states [s]
+
+    Attributes
+    ----------
+    before : CPU seconds of the tries before, once their state was loaded
     """
 
     def __init__(self, path: Path, identity: dict[str, str], every: float = 60.0):
-        self.path, self.identity, self.every = Path(path), identity, every
-        self._last = time.monotonic()
+        self.path, self.identity, self.every, self.before = Path(path), identity, every, 0.0
+        self._began, self._last = time.process_time(), time.monotonic()
+        for stray in self.path.parent.glob(f"{self.path.name}.tmp.*"):
+            stray.unlink(missing_ok=True)
 
     def load(self) -> Arrays | None:
         """The newest state, or None when there is no good one."""
@@ -122,12 +128,16 @@ class Kept:
             state, meta = load_state(self.path)
         except (FileNotFoundError, Damaged):
             return None
-        return state if meta == self.identity else None
+        if meta["identity"] != self.identity:
+            return None
+        self.before = meta["cpu_seconds"]
+        return state
 
     def save(self, state: Callable[[], Arrays]) -> None:
         """Keep what ``state`` returns, unless the last one is younger than ``every``."""
         if time.monotonic() - self._last >= self.every:
-            save_state(self.path, state(), self.identity)
+            spent = self.before + time.process_time() - self._began
+            save_state(self.path, state(), {"identity": self.identity, "cpu_seconds": spent})
             self._last = time.monotonic()
 
     def drop(self) -> None:

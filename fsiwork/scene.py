@@ -151,6 +151,10 @@ class Scene(Spec):
     def _gravity(self) -> Iterator[Fault]:
         if self.fluid and self.fluid.gravity and len(self.fluid.gravity) != self.box.dim:
             yield ("fluid", "gravity"), f"must have {self.box.dim} numbers, got {len(self.fluid.gravity)}"
+            return
+        for a, g in enumerate(self.gravity):
+            if g and any(side.kind == "symmetry" for side in self.box.sides[a]):
+                yield ("fluid", "gravity"), f"is not its own mirror image across the plane of symmetry along {'xyz'[a]}"
 
     @sense
     def _vortices(self) -> Iterator[Fault]:
@@ -258,7 +262,7 @@ def _outside(shape, box: Box) -> Iterator[Fault]:
         mirrors = [p for p, side in zip((first, last), box.sides[a], strict=True) if side.kind == "symmetry"]
         crossed = [p for p in mirrors if low < p < high]
         for plane in crossed:
-            if not abs(low + high - 2.0 * plane) <= 1e-9 * box.length[a]:
+            if not _mirrored_across(shape, a, plane, box):
                 yield (), f"crosses the plane of symmetry {'xyz'[a]} = {plane:.6g} and is not its own mirror image"
         inside = (low >= first or first in crossed) and (high <= last or last in crossed)
         if not inside:
@@ -266,6 +270,19 @@ def _outside(shape, box: Box) -> Iterator[Fault]:
                 (),
                 f"leaves the box along {'xyz'[a]}: [{low:.6g}, {high:.6g}] is not inside [{first:.6g}, {last:.6g}]",
             )
+
+
+def _mirrored_across(shape, a: int, plane: float, box: Box) -> bool:
+    """Whether a shape reaches as far in some oblique directions as in their mirror images across a plane."""
+    for numbers in OBLIQUE:
+        there, back = list(numbers[: box.dim]), list(numbers[: box.dim])
+        back[a] = -back[a]
+        if not abs(shape.reach(there) - shape.reach(back) - 2.0 * plane * there[a]) <= 1e-9 * box.length[a]:
+            return False
+    return True
+
+
+OBLIQUE = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.9, 0.4, 0.3), (0.3, 0.9, -0.5), (-0.4, 0.5, 0.8))
 
 
 def faults(error: Exception) -> list[str]:

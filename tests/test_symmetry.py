@@ -39,9 +39,18 @@ def made(part, far="free-slip", shape=SHAPE, **body):
     )
 
 
-@pytest.mark.parametrize("coupling", ["explicit", "semi-implicit", "stabilised"])
-def test_an_eighth_is_the_whole(coupling):
-    whole, eighth = (build(made(part, coupling=coupling)) for part in ("whole", "eighth"))
+@pytest.mark.parametrize(
+    "body",
+    [
+        {"coupling": "explicit"},
+        {"coupling": "semi-implicit"},
+        {},
+        {"renew": 1},
+        {"form": "adjoint", "transport": {"scheme": "upwind5"}, "renew": 2},
+    ],
+)
+def test_an_eighth_is_the_whole(body):
+    whole, eighth = (build(made(part, **body)) for part in ("whole", "eighth"))
     before = whole.bodies[0].phi.copy()
     for sim in (whole, eighth):
         for _ in range(5):
@@ -83,12 +92,26 @@ def test_both_ghosts_of_the_velocity_are_those_of_free_slip():
     assert np.array_equal(*found)
 
 
+def test_gravity_across_a_plane_of_symmetry_is_refused():
+    plain = made("eighth").model_dump()
+    for gravity in ([0.0, 0.0, -1.0], [0.1, 0.0, 0.0]):
+        with pytest.raises(ValidationError) as caught:
+            scene.Scene.model_validate(plain | {"fluid": plain["fluid"] | {"gravity": gravity}})
+        axis = "xyz"[np.flatnonzero(gravity)[0]]
+        fault = f"fluid.gravity: is not its own mirror image across the plane of symmetry along {axis}"
+        assert scene.faults(caught.value) == [fault]
+
+
 @pytest.mark.parametrize(
     ("changes", "fault"),
     [
         ({"transport": {"carry": "map"}}, "bodies.0: at planes of symmetry only bodies that carry a field"),
         (
             {"shape": {**SHAPE, "centre": [0.1, 0.0, 0.0]}},
+            "bodies.0.shape: crosses the plane of symmetry x = 0 and is not its own mirror image",
+        ),
+        (
+            {"shape": {"kind": "moved", "shape": SHAPE, "angle": 0.4, "shift": [0.0, 0.0, 0.0]}},
             "bodies.0.shape: crosses the plane of symmetry x = 0 and is not its own mirror image",
         ),
         ({"shape": {**SHAPE, "semi_axes": [1.2, 0.5, 0.6]}}, "bodies.0.shape: leaves the box along x"),

@@ -50,6 +50,7 @@ class Adjoint:
             self._q.fill(0.0)
             kernels.pull(self._q, gradient, phi, c, band.runs, s, g.h)
             self.edges.fill_scalar(self._q, "mirror")
+            self.edges.mirror(self._q, odd=a)
             shear.to_faces(self._face, self._q, *g.rows(1, 1), s)
             shear.smooth(force[a], self._face, *g.rows(), *self._across, 1.0)
 

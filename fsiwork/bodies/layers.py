@@ -44,6 +44,7 @@ class Layers:
         g, stretch = self.grid, self._stretch
         start, n = g.rows()
         d = closest.quintic(g, phi, self.reach[1] / g.h).astype(np.float64, copy=False)
+        self.edges.mirror(d)
         foot.stretches(stretch, phi, d, start, n, np.array([*g.strides, 0][:3]), g.h)
         near = g.inside(stretch)[np.abs(g.inside(d)) < BESIDE * g.h]
         if not near.size:

@@ -83,6 +83,13 @@ class Edges:
                 reflect(q, line, -s, 0, -s, GHOSTS, 1.0, ZERO)
                 reflect(q, line, n * s, (n - 1) * s, s, GHOSTS, 1.0, ZERO)
 
+    def mirror(self, q: np.ndarray, odd: int | None = None) -> None:
+        """Ghosts of a centre field beyond planes of symmetry alone: its image, across ``odd`` with other sign."""
+        for a, s in enumerate(self.grid.strides):
+            for side, (ghost, inner, step) in enumerate(((-s, 0, -s), (self.grid.n[a] * s, self._last(a), s))):
+                if self.sides[a][side].kind == "symmetry":
+                    reflect(q, self._lines[a], ghost, inner, step, GHOSTS, -1.0 if a == odd else 1.0, ZERO)
+
     def fill_pressure(self, q: np.ndarray) -> None:
         """Ghosts of the pressure: mirror, and zero on an outflow side."""
         self.fill_scalar(q, "mirror")

@@ -16,6 +16,7 @@ from fsiwork import joining, provenance, sources
 from fsiwork.checkpoint import Kept, replacing
 from fsiwork.netcdf import opened
 from fsiwork.targets import Plan, Point, Study
+from fsiwork.targets.plan import sources as code
 
 WARM_CELLS = (32, 36, 40, 48, 60)  # grids on which `warm` compiles: the first into which a box can be divided
 
@@ -52,34 +53,32 @@ def _calls(study: Study, path: Path | None, points: list[Point], out: Path) -> P
     results, costs = [], []
     for point in points:
         made = scene.load(path, point.overrides) if path else None
-        start = time.process_time()
+        words = {**study.args, **point.coords}
+        start, kept = time.process_time(), {}
         if lasting:
-            found = _lasting(function, made, {**study.args, **point.coords}, out.with_name(f"{point.name}.state"))
-        else:
-            found = function(made, {**study.args, **point.coords})
-        spent = time.process_time() - start
+            kept = {"kept": Kept(out.with_name(f"{point.name}.state"), _identity(study, made, words))}
+        found = function(made, words, **kept)
+        spent = time.process_time() - start + sum(state.before for state in kept.values())
         print(f"{point.name}: {spent:.2f} s", flush=True)
         cells = made.box.cells if made else 0
         steps, cells = found.pop("n_steps", 0), found.pop("n_cells", cells)
         costs.append({"cpu_seconds": round(spent, 6), "steps": int(steps), "cells": int(cells)})
         results.append({name: _plain(value) for name, value in found.items()})
+        for state in kept.values():
+            state.drop()
     _write_json(out, results)
     _write_json(provenance.cost_path(out), costs)
     return out
 
 
-def _lasting(function, scene, point: dict[str, Any], path: Path) -> dict[str, Any]:
-    """A function that goes on from its own state after it was killed."""
-    identity = {
+def _identity(study: Study, scene, words: dict[str, Any]) -> dict[str, str]:
+    """What a state must agree with for a call to go on from it."""
+    return {
         "scene": sources.scene_id(scene.model_dump_json()),
-        "point": json.dumps(point),
+        "words": json.dumps(words),
         "source": sources.source_hash(),
-        "studies": sources.source_hash("studies"),
+        "call": code(study.call, "studies"),
     }
-    kept = Kept(path, identity)
-    found = function(scene, point, kept=kept)
-    kept.drop()
-    return found
 
 
 def _plain(value: Any) -> Any:
